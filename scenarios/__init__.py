@@ -1,0 +1,21 @@
+"""Scenarios: what is flown, by whom, what goes wrong and what counts as success. Data and a loader; knows no IO but files."""
+
+from scenarios.layout import offsets_ne
+from scenarios.loading import ScenarioError, find, load, names, parse
+from scenarios.models import Fault, Leg, MotorDegradation, Redirect, RotorFault, Scenario, direction
+
+__all__ = [
+    "Fault",
+    "Leg",
+    "MotorDegradation",
+    "Redirect",
+    "RotorFault",
+    "Scenario",
+    "ScenarioError",
+    "direction",
+    "find",
+    "load",
+    "names",
+    "offsets_ne",
+    "parse",
+]

@@ -1,0 +1,168 @@
+"""From a TOML file, or the name of one that ships, to a checked `Scenario`; every refusal names key, value and what is allowed."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from scenarios.models import Scenario
+
+FOLDER = Path(__file__).parent
+
+
+class ScenarioError(ValueError):
+    """A scenario that cannot be flown, in one sentence a person can act on."""
+
+
+def names() -> list[str]:
+    """Names of the scenarios that ship, in alphabetical order."""
+    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+
+
+def load(name_or_path: str | Path, *, overrides: Sequence[str] = ()) -> Scenario:
+    """Load a scenario by name ("emergency") or path ("my/scenario.toml").
+
+    overrides: "section.key=value" each, the value written as in TOML; a list's entry by its place: "fault.0.onset_s=5".
+    Raises ScenarioError.
+    """
+    path = find(name_or_path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{path}: cannot be read: {error}") from None
+    return parse(text, source=path.name, overrides=overrides)
+
+
+def find(name_or_path: str | Path) -> Path:
+    """The file behind a shipped scenario's name or a path. Raises ScenarioError."""
+    shipped = FOLDER / f"{name_or_path}.toml"
+    if str(name_or_path) in names():
+        return shipped
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    raise ScenarioError(
+        f"no scenario {str(name_or_path)!r}: neither a file nor one of those that ship ({', '.join(names())})"
+    )
+
+
+def parse(text: str, *, source: str, overrides: Sequence[str] = ()) -> Scenario:
+    """Build a scenario from the text of a TOML file; `source` is how errors call it. Raises ScenarioError."""
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(f"{source}: not valid TOML: {error}") from None
+    for override in overrides:
+        _override(tables, override)
+    try:
+        return Scenario.model_validate(tables)
+    except ValidationError as error:
+        raise ScenarioError(f"{source}: {'; '.join(explain(error, tables))}") from None
+
+
+def explain(error: ValidationError, tables: dict[str, Any]) -> list[str]:
+    """One clause for each thing wrong: the key, the value and what is allowed."""
+    return [_clause(problem, tables) for problem in error.errors(include_url=False)]
+
+
+def _clause(problem: Any, tables: dict[str, Any]) -> str:
+    location = [part for part in problem["loc"] if part not in _TAGS]
+    key = ".".join(map(str, location))
+    if problem["type"] == "extra_forbidden":
+        allowed = _allowed_keys(tables, location[:-1])
+        close = difflib.get_close_matches(str(location[-1]), allowed, n=1)
+        hint = f"did you mean {close[0]}? " if close else ""
+        return f"{key} = {problem['input']!r}: there is no such key; {hint}allowed here: {', '.join(allowed)}"
+    if problem["type"] in ("missing", "union_tag_not_found"):
+        key = key if problem["type"] == "missing" else f"{key}.kind"
+        return f"{key}: this key is missing"
+    if problem["type"] == "union_tag_invalid":
+        context = problem["ctx"]
+        return f"{key}.kind = {context['tag']!r}: allowed are {context['expected_tags']}"
+    message = str(problem["msg"]).removeprefix("Value error, ").replace("Input should be", "must be")
+    message = re.sub(r"a valid dictionary or instance of \w+", "a section of keys", message)
+    if problem["type"] == "value_error":
+        return f"{key}: {message}" if key else message
+    return f"{key} = {problem['input']!r}: {message}"
+
+
+_TAGS = ("motor_degradation", "rotor")  # pydantic puts the tag of a union into the path; people did not type it
+
+
+def _allowed_keys(tables: dict[str, Any], location: Sequence[Any]) -> list[str]:
+    """Keys of the model at this place of the file."""
+    model: type[BaseModel] = Scenario
+    value: Any = tables
+    for part in location:
+        value = value[part]
+        if isinstance(part, int):
+            continue
+        model = _model_of(model.model_fields[part].annotation, value)
+    if isinstance(value, dict) and "kind" in value:
+        model = _model_of(model, value)
+    return list(model.model_fields)
+
+
+def _model_of(annotation: Any, value: Any) -> type[BaseModel]:
+    """The section a field holds; of a union, the one whose kind the value names."""
+    candidates = list(_models_in(annotation))
+    kind = value.get("kind") if isinstance(value, dict) else None
+    if isinstance(value, list) and value and isinstance(value[-1], dict):
+        kind = value[-1].get("kind")
+    for candidate in candidates:
+        field = candidate.model_fields.get("kind")
+        if field is not None and kind in getattr(field.annotation, "__args__", ()):
+            return candidate
+    return candidates[0]
+
+
+def _models_in(annotation: Any) -> Iterable[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for argument in getattr(annotation, "__args__", ()):
+        yield from _models_in(argument)
+
+
+def _override(tables: dict[str, Any], override: str) -> None:
+    """Set one key of the file's tables from "section.key=value", in place."""
+    dotted, equals, text = override.partition("=")
+    parts = dotted.strip().split(".")
+    if not equals or not all(parts):
+        raise ScenarioError(f"--set {override}: must read section.key=value")
+    value = _toml_value(text.strip())
+    at: Any = tables
+    for part in parts[:-1]:
+        at = _descend(at, part, override)
+    if isinstance(at, list):
+        at[_index(at, parts[-1], override)] = value
+    else:
+        at[parts[-1]] = value
+
+
+def _toml_value(text: str) -> Any:
+    """A value as TOML writes it; a bare word is taken for a string."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def _descend(at: Any, part: str, override: str) -> Any:
+    if isinstance(at, list):
+        return at[_index(at, part, override)]
+    below = at.setdefault(part, {})
+    if not isinstance(below, (dict, list)):
+        raise ScenarioError(f"--set {override}: {part} is a value, not a section")
+    return below
+
+
+def _index(at: list[Any], part: str, override: str) -> int:
+    if not part.isdecimal() or int(part) >= len(at):
+        raise ScenarioError(f"--set {override}: {part!r} is no place in a list of {len(at)}; places count from 0")
+    return int(part)

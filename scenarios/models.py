@@ -1,0 +1,312 @@
+"""What a scenario is: frozen models, checked as they are built.
+
+Keys carry their unit where it is not SI-and-NED inside; angles are degrees here, because people type them.
+Time 0 is mission start: every vehicle at altitude, cruising begins.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+Fraction = Annotated[float, Field(ge=0, le=1)]
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Heading = Annotated[float, Field(ge=-360, le=360)]
+Likert = Annotated[float, Field(ge=1, le=5)]
+
+
+class Section(BaseModel):
+    """One table of the file: no unknown key, no change after loading, no NaN or infinity."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True)
+
+
+class Time(Section):
+    """How finely time is cut."""
+
+    physics_hz: Annotated[int, Field(ge=50, le=2000)] = 250
+    """JSBSim steps a second."""
+    period_s: Positive = 0.1
+    """One tick of the ground station: a whole number of physics steps."""
+    timeout_s: Positive = 180.0
+    """A flight that takes longer, take-off to disarm, is given up (exit code 3)."""
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> Time:
+        steps = self.period_s * self.physics_hz
+        if abs(steps - round(steps)) > 1e-9 or round(steps) < 1:
+            raise ValueError(
+                f"period_s = {self.period_s} is {steps:g} physics steps at physics_hz = {self.physics_hz}: "
+                "it must be a whole number of them"
+            )
+        return self
+
+    @property
+    def steps_per_tick(self) -> int:
+        """Physics steps in one tick of the ground station."""
+        return round(self.period_s * self.physics_hz)
+
+
+class Swarm(Section):
+    """Who flies, and in which formation. System ids count row by row from 1; row 1 is the front."""
+
+    rows: Annotated[int, Field(ge=1)] = 2
+    columns: Annotated[int, Field(ge=1)] = 3
+    spacing_m: Positive = 3.0
+    leaders: tuple[int, ...] = (1, 3)
+    """System ids of the robots that know where the mission goes."""
+    altitude_m: Positive = 10.0
+    """Height above the take-off place."""
+
+    @model_validator(mode="after")
+    def _ids(self) -> Swarm:
+        if not 1 <= self.count <= 250:
+            raise ValueError(f"rows × columns = {self.count}: allowed are 1 to 250 vehicles (MAVLink system ids)")
+        if not self.leaders:
+            raise ValueError("leaders = []: at least one robot must know where the mission goes")
+        if len(set(self.leaders)) != len(self.leaders):
+            raise ValueError(f"leaders = {list(self.leaders)}: a vehicle is named twice")
+        for leader in self.leaders:
+            if not 1 <= leader <= self.count:
+                raise ValueError(f"leaders names vehicle {leader}: allowed are 1 to {self.count}")
+        return self
+
+    @property
+    def count(self) -> int:
+        """Number of vehicles."""
+        return self.rows * self.columns
+
+
+class Leg(Section):
+    """A straight line of the virtual leader. It starts where the virtual leader is, not where the swarm is."""
+
+    task: str
+    heading_deg: Heading
+    length_m: Positive
+
+
+class Mission(Section):
+    """What the swarm was sent to do."""
+
+    cruise_m_s: Positive = 1.5
+    leg: tuple[Leg, ...]
+
+    @model_validator(mode="after")
+    def _goes_somewhere(self) -> Mission:
+        if not self.leg:
+            raise ValueError("leg = []: a mission needs at least one [[mission.leg]]")
+        return self
+
+
+class Redirect(Section):
+    """An emergency: the current leg is interrupted and a new one begins where the virtual leader is."""
+
+    kind: Literal["redirect"]
+    at_length_m: Positive
+    """Length of path flown since mission start when the call comes."""
+    task: str
+    heading_deg: Heading
+    length_m: Positive
+
+
+class Fault(Section):
+    """What every fault has: whom it strikes, and when."""
+
+    vehicle: Annotated[int, Field(ge=1)]
+    onset_s: NotNegative = 0.0
+    end_s: Positive | None = None
+    """Never, if absent."""
+
+    @model_validator(mode="after")
+    def _ends_after_onset(self) -> Fault:
+        if self.end_s is not None and self.end_s <= self.onset_s:
+            raise ValueError(f"end_s = {self.end_s} is not after onset_s = {self.onset_s}")
+        return self
+
+    def active(self, time_s: float) -> bool:
+        """Whether the fault acts at this time since mission start [s]."""
+        return self.onset_s <= time_s and (self.end_s is None or time_s < self.end_s)
+
+
+class MotorDegradation(Fault):
+    """The paper's fault: a restricted maximum speed and a fixed offset across the direction of flight."""
+
+    kind: Literal["motor_degradation"]
+    max_speed_fraction: Fraction = 0.4
+    """Of cruise: the paper flies 0.4 and 0.7."""
+    offset_fraction: Fraction = 0.47
+    """Of cruise, to the left of the commanded direction."""
+
+
+class RotorFault(Fault):
+    """A physical fault of one rotor: what it does to the flight is up to the flight model."""
+
+    kind: Literal["rotor"]
+    rotor: Annotated[int, Field(ge=1, le=4)]
+    efficiency: Fraction = 1.0
+    """Of the healthy thrust at the same speed."""
+    speed_limit: Fraction = 1.0
+    """Of the healthy maximum speed."""
+
+
+AnyFault = Annotated[MotorDegradation | RotorFault, Field(discriminator="kind")]
+
+
+class Control(Section):
+    """The update rule and its parameters (reference values: `docs/reproduction.md`)."""
+
+    rule: Literal["average", "trust-r"] = "trust-r"
+    c1: NotNegative = 0.10
+    """1/s: navigational feedback of position, eq. 11."""
+    c2: NotNegative = 0.60
+    """Navigational feedback of velocity, eq. 11."""
+    feedback_cap: NotNegative = 0.25
+    """Of cruise: the most that navigational feedback may ask for."""
+    weights: Literal["sender", "literal"] = "sender"
+    """η of eq. 13: lowered for distrusted senders, or one constant as printed."""
+    eta: Fraction = 0.05
+    """η of a sender whose trust is below the threshold."""
+    threshold: Fraction = 0.5
+    profile: Literal["paper", "recommended"] = "paper"
+    separation_radius_m: NotNegative = 2.0
+    separation_gain: NotNegative = 0.3
+    """1/s: metres inside the radius to speed apart."""
+    response_time_s: Positive = 0.3
+    """Identified first-order time constant of the vehicles' velocity response; `recommended` scales with it."""
+
+
+class Network(Section):
+    """Who hears whom, eq. 13."""
+
+    range_m: Positive = 28.0
+    """R: nothing is heard from here on."""
+    best_range_m: Positive = 6.0
+    """ρ: best quality up to here."""
+    decay: NotNegative = 2.0
+    """γ: how fast quality falls between ρ and R."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Network:
+        if self.best_range_m >= self.range_m:
+            raise ValueError(
+                f"best_range_m = {self.best_range_m} must be below range_m = {self.range_m} (eq. 13 needs 0 < ρ < R)"
+            )
+        return self
+
+
+class Trust(Section):
+    """Where trust comes from."""
+
+    source: Literal["truth", "ratings"] = "truth"
+    """The simulation's own knowledge of the fault, or the study's mean ratings."""
+    faulty_rating: Likert = 1.94
+    """Mean rating of the failed robot in the user study, 1 to 5."""
+    others_rating: Likert = 3.83
+    """Mean rating of the repaired swarm in the user study, 1 to 5."""
+
+
+class Noise(Section):
+    """What blurs telemetry and air, seeded, counted from mission start."""
+
+    velocity_m_s: NotNegative = 0.0
+    """Standard deviation a horizontal axis, white, each telemetry message."""
+    position_m: NotNegative = 0.0
+    """Standard deviation a horizontal axis, white, each telemetry message."""
+    gust_m_s: NotNegative = 0.0
+    """Standard deviation an axis of each vehicle's own first-order Gauss–Markov wind."""
+    gust_time_s: Positive = 2.0
+    """Its correlation time."""
+
+
+class Wind(Section):
+    """Air that moves as a whole."""
+
+    speed_m_s: NotNegative = 0.0
+    from_deg: Heading = 0.0
+    """Where it blows from, as a weather report says it."""
+    turbulence: Annotated[float, Field(ge=0, le=15)] = 0.0
+    """Mean wind at 20 ft [m/s] that drives JSBSim's MIL-F-8785C turbulence; 0 is none."""
+    vehicles: tuple[int, ...] | None = None
+    """System ids it acts on; all, if absent."""
+
+
+class Limits(Section):
+    """What a set-point may ask for at most."""
+
+    speed_m_s: Positive = 5.0
+    acceleration_m_s2: Positive = 10.0
+
+
+class Expect(Section):
+    """What makes a flight pass (the paper's repaired condition: 4° and 3.2 m)."""
+
+    heading_error_deg: Positive = 4.0
+    distance_to_target_m: Positive = 3.2
+    min_separation_m: NotNegative = 1.0
+
+
+class Scenario(Section):
+    """One flight, from formation to what counts as success."""
+
+    title: str
+    time: Time = Time()
+    swarm: Swarm = Swarm()
+    mission: Mission
+    event: tuple[Redirect, ...] = ()
+    fault: tuple[AnyFault, ...] = ()
+    control: Control = Control()
+    network: Network = Network()
+    trust: Trust = Trust()
+    noise: Noise = Noise()
+    wind: Wind = Wind()
+    limits: Limits = Limits()
+    expect: Expect = Expect()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Scenario:
+        known = f"allowed are 1 to {self.swarm.count}"
+        for index, fault in enumerate(self.fault):
+            if fault.vehicle > self.swarm.count:
+                raise ValueError(f"fault.{index}.vehicle = {fault.vehicle}: there is no such vehicle; {known}")
+        for vehicle in self.wind.vehicles or ():
+            if not 1 <= vehicle <= self.swarm.count:
+                raise ValueError(f"wind.vehicles names vehicle {vehicle}: there is no such vehicle; {known}")
+        flown, planned = 0.0, sum(leg.length_m for leg in self.mission.leg)
+        for index, event in enumerate(self.event):
+            if not flown < event.at_length_m < planned:
+                raise ValueError(
+                    f"event.{index}.at_length_m = {event.at_length_m}: must lie on the path that is then being flown, "
+                    f"between {flown:g} m and {planned:g} m"
+                )
+            flown, planned = event.at_length_m, event.at_length_m + event.length_m
+        if self.mission.cruise_m_s > self.limits.speed_m_s:
+            raise ValueError(
+                f"mission.cruise_m_s = {self.mission.cruise_m_s} is above limits.speed_m_s = {self.limits.speed_m_s}"
+            )
+        return self
+
+    def with_severity(self, max_speed_fraction: float) -> Scenario:
+        """The same scenario with every degraded motor at this fraction of cruise."""
+        return self._revised(
+            fault=[
+                fault.model_dump() | {"max_speed_fraction": max_speed_fraction}
+                if isinstance(fault, MotorDegradation)
+                else fault.model_dump()
+                for fault in self.fault
+            ]
+        )
+
+    def without_faults(self) -> Scenario:
+        """The same scenario, everything healthy."""
+        return self._revised(fault=[])
+
+    def _revised(self, **changes: Any) -> Scenario:
+        return Scenario.model_validate(self.model_dump() | changes)
+
+
+def direction(heading_deg: float) -> tuple[float, float]:
+    """Unit vector (north, east) of a heading, clockwise from north."""
+    return math.cos(math.radians(heading_deg)), math.sin(math.radians(heading_deg))

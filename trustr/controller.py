@@ -1,0 +1,100 @@
+"""One tick of the swarm's control: what is known of every robot in, a velocity command for every robot out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from trustr.consensus import RULES, weighted_mean
+from trustr.leader import VirtualLeader, navigational_feedback
+from trustr.network import Array, Graph, neighbours
+from trustr.separation import separation
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Settings:
+    """What stays the same through a flight."""
+
+    rule: str
+    """A name of `consensus.RULES`."""
+    offset_ne: Array
+    """(N, 2) m, each robot's place in the formation."""
+    leaders: npt.NDArray[np.intp]
+    """(L,) indices of the robots that hear the virtual leader."""
+    c1: float
+    """1/s."""
+    c2: float
+    """Without unit."""
+    feedback_cap: float
+    """m/s."""
+    lead_s: float
+    """s: feed-forward of the virtual leader's acceleration."""
+    range_m: float
+    """R of eq. 13."""
+    best_range_m: float
+    """ρ of eq. 13."""
+    decay: float
+    """γ of eq. 13."""
+    weights: Literal["sender", "literal"]
+    """How η of eq. 13 is read."""
+    eta: float
+    threshold: float
+    """Trust below which a sender's η is `eta`."""
+    separation_radius: float
+    """m."""
+    separation_gain: float
+    """1/s."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observation:
+    """What a tick knows: measured, in the swarm's NED frame, horizontal."""
+
+    position_ne: Array
+    """(N, 2) m."""
+    velocity_ne: Array
+    """(N, 2) m/s."""
+    heard: npt.NDArray[np.bool_]
+    """(N,) False where data are stale, missing or not finite."""
+    trust: Array
+    """(N,) in [0, 1]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Decision:
+    """What a tick commands, and why."""
+
+    velocity_ne: Array
+    """(N, 2) m/s; zero for robots that are not heard."""
+    graph: Graph
+    weights: Array
+    """(E,) one for each edge of the graph."""
+
+
+def decide(observation: Observation, virtual: VirtualLeader, settings: Settings) -> Decision:
+    """Eq. 11 and 12 (or eq. 1) for all robots at once, separation added.
+
+    A robot that is not heard has weight exactly 0 with every other, and is commanded to stand still.
+    """
+    heard = observation.heard & np.isfinite(observation.position_ne).all(1) & np.isfinite(observation.velocity_ne).all(1)
+    position = observation.position_ne
+    velocity = observation.velocity_ne if heard.all() else np.where(heard[:, None], observation.velocity_ne, 0.0)
+    graph = neighbours(position, heard, range_m=settings.range_m)
+    weights = RULES[settings.rule](graph, observation.trust, settings)
+    command = weighted_mean(graph, weights, velocity)
+    leaders = settings.leaders
+    command[leaders] += navigational_feedback(
+        position[leaders],
+        velocity[leaders],
+        settings.offset_ne[leaders],
+        virtual,
+        c1=settings.c1,
+        c2=settings.c2,
+        cap=settings.feedback_cap,
+        lead_s=settings.lead_s,
+    )
+    command += separation(graph, position, radius=settings.separation_radius, gain=settings.separation_gain)
+    return Decision(command if heard.all() else np.where(heard[:, None], command, 0.0), graph, weights)

@@ -1,0 +1,50 @@
+"""The virtual leader (γ-robot) and the navigational feedback of eq. 11.
+
+Leaders, and only they, know where the virtual leader is; the others follow through the consensus.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trustr.network import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VirtualLeader:
+    """Where the mission wants the formation's mean to be, and how it moves there."""
+
+    position_ne: Array
+    """(2,) m."""
+    velocity_ne: Array
+    """(2,) m/s."""
+    acceleration_ne: Array
+    """(2,) m/s²; zero in the paper's profile, whose virtual leader changes velocity at once."""
+
+
+def navigational_feedback(
+    position_ne: Array,
+    velocity_ne: Array,
+    offset_ne: Array,
+    virtual: VirtualLeader,
+    *,
+    c1: float,
+    c2: float,
+    cap: float,
+    lead_s: float = 0.0,
+) -> Array:
+    """u^γ of eq. 11 for each of L leaders: (L, 2) m/s, never longer than `cap`.
+
+    u^γ = −c1 (x_i − offset_i − x_γ) − c2 (v_i − v_γ) + lead_s a_γ, all measured, so that the accumulated errors δx and δu
+    of the paper are in it already. (L, 2) positions m, velocities m/s and offsets m; c1 in 1/s, c2 without unit.
+    lead_s: feed-forward of the virtual leader's acceleration [s], our addition; the paper has none.
+    """
+    wanted = (
+        -c1 * (position_ne - offset_ne - virtual.position_ne)
+        - c2 * (velocity_ne - virtual.velocity_ne)
+        + lead_s * virtual.acceleration_ne
+    )
+    length = np.hypot(wanted[:, 0], wanted[:, 1])
+    return np.asarray(wanted * np.minimum(1.0, cap / np.maximum(length, 1e-12))[:, None])
