@@ -1,0 +1,1 @@
+"""Simulated vehicles: each flies in JSBSim behind its own MAVLink endpoint."""
