@@ -207,7 +207,7 @@ class Vehicle:
         )
 
     def _specific_force(self, roll: float, pitch: float) -> Vector:
-        """What an accelerometer reads. Held down, JSBSim reports no force: there the ground carries the weight."""
+        """What an accelerometer reads. Held down, JSBSim reports no force, though the ground carries it."""
         if not self._hold_down.get_double_value():
             return _vector(self._force, FOOT)
         g = self._gravity.get_double_value() * FOOT
