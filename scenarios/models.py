@@ -49,6 +49,15 @@ class Time(Section):
         """Physics steps in one tick of the ground station."""
         return round(self.period_s * self.physics_hz)
 
+    @property
+    def period_ns(self) -> int:
+        """One tick of the ground station."""
+        return round(self.period_s * 1e9)
+
+    def ticks(self, seconds: float) -> int:
+        """The tick at or next after this many seconds."""
+        return math.ceil(seconds / self.period_s - 1e-9)
+
 
 class Swarm(Section):
     """Who flies, and in which formation. System ids count row by row from 1; row 1 is the front."""
@@ -92,6 +101,8 @@ class Mission(Section):
     """What the swarm was sent to do."""
 
     cruise_m_s: Positive = 1.5
+    run_up_s: NotNegative = 4.0
+    """Time before mission start in which the formation is brought to cruise; 0 begins at rest."""
     leg: tuple[Leg, ...]
 
     @model_validator(mode="after")

@@ -30,8 +30,8 @@ class Settings:
     """Without unit."""
     feedback_cap: float
     """m/s."""
-    lead_s: float
-    """s: feed-forward of the virtual leader's acceleration."""
+    response_s: float
+    """s: first-order response of the vehicles, for the feed-forward of the virtual leader's acceleration; 0 is none."""
     range_m: float
     """R of eq. 13."""
     best_range_m: float
@@ -86,6 +86,7 @@ def decide(observation: Observation, virtual: VirtualLeader, settings: Settings)
     weights = RULES[settings.rule](graph, observation.trust, settings)
     command = weighted_mean(graph, weights, velocity)
     leaders = settings.leaders
+    followers_a_leader = np.count_nonzero(observation.trust >= settings.threshold) / len(leaders)
     command[leaders] += navigational_feedback(
         position[leaders],
         velocity[leaders],
@@ -94,7 +95,7 @@ def decide(observation: Observation, virtual: VirtualLeader, settings: Settings)
         c1=settings.c1,
         c2=settings.c2,
         cap=settings.feedback_cap,
-        lead_s=settings.lead_s,
+        lead_s=settings.response_s * followers_a_leader,
     )
     command += separation(graph, position, radius=settings.separation_radius, gain=settings.separation_gain)
     return Decision(command if heard.all() else np.where(heard[:, None], command, 0.0), graph, weights)

@@ -39,7 +39,8 @@ def navigational_feedback(
 
     u^γ = −c1 (x_i − offset_i − x_γ) − c2 (v_i − v_γ) + lead_s a_γ, all measured, so that the accumulated errors δx and δu
     of the paper are in it already. (L, 2) positions m, velocities m/s and offsets m; c1 in 1/s, c2 without unit.
-    lead_s: feed-forward of the virtual leader's acceleration [s], our addition; the paper has none.
+    lead_s: feed-forward of the virtual leader's acceleration [s], our addition; the paper has none. Consensus over N robots
+    that answer in τ seconds gives their mean velocity v̄̇ = (L/N) u^γ / τ, so τ N / L makes the mean accelerate as it does.
     """
     wanted = (
         -c1 * (position_ne - offset_ne - virtual.position_ne)

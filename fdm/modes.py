@@ -1,0 +1,241 @@
+"""Flight modes and failsafes of a simulated vehicle: a pure state machine and the velocity each mode asks for.
+
+                 arm              take-off                 height reached
+    disarmed ───────────► HOLD ─────────────► TAKEOFF ───────────────────────► HOLD
+        ▲                  │  ▲                                                 │
+        │                  │  └───────────── set-points silent 0.5 s ───────┐   │ mode OFFBOARD,
+        │                  │ land, or 5 s after set-points fell silent      │   │ set-points coming
+        │ 0.5 s on         ▼                                                │   ▼
+        └ the ground ──── LAND ◄───────────────────── land ────────────── OFFBOARD
+
+Everything is SI and the vehicle's own NED frame. The numbers are PX4's defaults where PX4 has one.
+https://docs.px4.io/main/en/advanced_config/parameter_reference.html
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from enum import Enum
+
+Vector = tuple[float, float, float]
+
+TAKEOFF_SPEED = 1.5  # m/s, MPC_TKO_SPEED
+DESCENT_SPEED = 1.5  # m/s, MPC_Z_V_AUTO_DN: landing, above SLOW_BELOW
+LANDING_SPEED = 0.7  # m/s, MPC_LAND_SPEED: landing, near the ground
+SLOW_BELOW = 3.0  # m above the take-off place
+HOLD_GAIN = 0.95  # 1/s, MPC_XY_P
+HOLD_SPEED = 3.0  # m/s, the most that holding a position may ask for
+STOPPED = 0.3  # m/s: below it, the place to hold is taken
+REACHED = 0.2  # m: take-off is over
+DEFAULT_TAKEOFF_HEIGHT = 2.5  # m, MIS_TAKEOFF_ALT
+LANDED_FOR = 0.5  # s on the ground, then disarm
+IDLE_DISARM = 10.0  # s, COM_DISARM_PRFLT: armed but never taken off
+READY_AFTER = 1.0  # s after boot until sensors have settled
+PRESS_DOWN = 1.0  # m/s downwards asked for on the ground, so that rotors idle
+
+
+class Mode(Enum):
+    """What flies the vehicle."""
+
+    HOLD = "hold"
+    TAKEOFF = "takeoff"
+    OFFBOARD = "offboard"
+    LAND = "land"
+
+
+class Severity(Enum):
+    """MAV_SEVERITY of a word to the ground."""
+
+    CRITICAL = 2
+    WARNING = 4
+    INFO = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Failsafe:
+    """When the vehicle stops trusting its ground station."""
+
+    setpoint_silence_s: float = 0.5
+    """COM_OF_LOSS_T: then it holds."""
+    land_after_s: float = 5.0
+    """After it began to hold: then it lands."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setpoint:
+    """A velocity asked for from outside."""
+
+    time_s: float
+    """When it came."""
+    velocity_ned: Vector
+    yaw: float | None = None
+    """rad; absent: as it is."""
+    yaw_rate: float = 0.0
+    """rad/s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What the vehicle is and where, at one instant."""
+
+    time_s: float
+    position_ned: Vector
+    velocity_ned: Vector
+    yaw: float
+    on_ground: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Pilot:
+    """State of the machine."""
+
+    armed: bool = False
+    mode: Mode = Mode.HOLD
+    anchor_ned: Vector | None = None
+    """Where HOLD stays, once it has stopped; where TAKEOFF goes; over which place LAND comes down."""
+    setpoint: Setpoint | None = None
+    """The last one that came, whatever the mode."""
+    yaw: float = 0.0
+    """rad: heading to keep."""
+    land_at_s: float | None = None
+    """Set when set-points fall silent."""
+    grounded_since_s: float | None = None
+    airborne: bool = False
+    """Has left the ground since it was armed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What an event did: the state after it, and whether the vehicle agreed."""
+
+    pilot: Pilot
+    accepted: bool = True
+    words: tuple[tuple[Severity, str], ...] = ()
+
+
+def _refuse(pilot: Pilot, words: str) -> Outcome:
+    return Outcome(pilot, accepted=False, words=((Severity.CRITICAL, words),))
+
+
+def arm(pilot: Pilot, now: Situation) -> Outcome:
+    """Start the rotors."""
+    if pilot.armed:
+        return Outcome(pilot)
+    if now.time_s < READY_AFTER:
+        return _refuse(pilot, "Arming denied: sensors are settling")
+    armed = replace(
+        pilot, armed=True, mode=Mode.HOLD, anchor_ned=None, yaw=now.yaw, land_at_s=None,
+        grounded_since_s=now.time_s, airborne=False,
+    )  # fmt: skip
+    return Outcome(armed, words=((Severity.INFO, "Armed by external command"),))
+
+
+def disarm(pilot: Pilot, now: Situation, *, force: bool) -> Outcome:
+    """Stop the rotors; in the air only by force."""
+    if pilot.armed and not now.on_ground and not force:
+        return _refuse(pilot, "Disarming denied: not landed")
+    return Outcome(replace(pilot, armed=False, mode=Mode.HOLD, land_at_s=None))
+
+
+def take_off(pilot: Pilot, now: Situation, height: float) -> Outcome:
+    """Climb straight up to `height` [m above the vehicle's origin]."""
+    if not pilot.armed:
+        return _refuse(pilot, "Take-off denied: arm first")
+    if height <= 0.0:
+        return _refuse(pilot, "Take-off denied: altitude is below home")
+    north, east, _ = now.position_ned
+    return Outcome(
+        replace(pilot, mode=Mode.TAKEOFF, anchor_ned=(north, east, -height), land_at_s=None),
+        words=((Severity.INFO, f"Takeoff to {height:.1f} meters above home"),),
+    )
+
+
+def set_mode(pilot: Pilot, now: Situation, mode: Mode, failsafe: Failsafe) -> Outcome:
+    """Change to HOLD, OFFBOARD or LAND."""
+    if mode is Mode.OFFBOARD and not _hears_setpoints(pilot, now, failsafe):
+        return _refuse(pilot, "Offboard denied: no set-points are coming")
+    if mode is pilot.mode:
+        return Outcome(pilot)
+    return Outcome(replace(pilot, mode=mode, anchor_ned=None, land_at_s=None))
+
+
+def hear(pilot: Pilot, setpoint: Setpoint) -> Pilot:
+    """Take note of a set-point; OFFBOARD flies it."""
+    return replace(pilot, setpoint=setpoint)
+
+
+def advance(pilot: Pilot, now: Situation, failsafe: Failsafe) -> Outcome:
+    """Let time pass: arrivals, landings, silence."""
+    if not pilot.armed:
+        return Outcome(pilot)
+    pilot = _watch_the_ground(pilot, now)
+    grounded_s = 0.0 if pilot.grounded_since_s is None else now.time_s - pilot.grounded_since_s
+    if pilot.mode is Mode.LAND and grounded_s >= LANDED_FOR:
+        return Outcome(replace(pilot, armed=False), words=((Severity.INFO, "Landed, disarmed"),))
+    if pilot.mode is Mode.HOLD and not pilot.airborne and grounded_s >= IDLE_DISARM:
+        return Outcome(replace(pilot, armed=False), words=((Severity.INFO, "Disarmed: no take-off"),))
+    if pilot.mode is Mode.TAKEOFF and pilot.anchor_ned is not None:
+        if abs(now.position_ned[2] - pilot.anchor_ned[2]) < REACHED:
+            return Outcome(
+                replace(pilot, mode=Mode.HOLD), words=((Severity.INFO, "Take-off height reached"),)
+            )
+    elif pilot.mode is Mode.OFFBOARD and not _hears_setpoints(pilot, now, failsafe):
+        lost = replace(pilot, mode=Mode.HOLD, anchor_ned=None, land_at_s=now.time_s + failsafe.land_after_s)
+        return Outcome(lost, words=((Severity.CRITICAL, "Set-points lost: holding"),))
+    elif pilot.land_at_s is not None and now.time_s >= pilot.land_at_s:
+        landing = replace(pilot, mode=Mode.LAND, anchor_ned=None, land_at_s=None)
+        return Outcome(landing, words=((Severity.CRITICAL, "Set-points did not come back: landing"),))
+    return Outcome(_anchored(pilot, now))
+
+
+def command(pilot: Pilot, now: Situation) -> Vector:
+    """The velocity the mode asks for [m/s, NED]."""
+    if now.on_ground and pilot.mode is not Mode.TAKEOFF:
+        return 0.0, 0.0, PRESS_DOWN
+    if pilot.mode is Mode.OFFBOARD and pilot.setpoint is not None:
+        return pilot.setpoint.velocity_ned
+    north, east, down = (0.0, 0.0, 0.0) if pilot.anchor_ned is None else _towards(pilot.anchor_ned, now)
+    if pilot.mode is Mode.TAKEOFF:
+        down = max(down, -TAKEOFF_SPEED)
+    elif pilot.mode is Mode.LAND:
+        down = DESCENT_SPEED if -now.position_ned[2] > SLOW_BELOW else LANDING_SPEED
+    return north, east, down
+
+
+def heading(pilot: Pilot, dt: float) -> float:
+    """The yaw to keep [rad], `dt` seconds after it was last asked for."""
+    setpoint = pilot.setpoint
+    if pilot.mode is not Mode.OFFBOARD or setpoint is None:
+        return pilot.yaw
+    yaw = pilot.yaw if setpoint.yaw is None else setpoint.yaw
+    return math.remainder(yaw + setpoint.yaw_rate * dt, math.tau)
+
+
+def _hears_setpoints(pilot: Pilot, now: Situation, failsafe: Failsafe) -> bool:
+    return pilot.setpoint is not None and now.time_s - pilot.setpoint.time_s <= failsafe.setpoint_silence_s
+
+
+def _watch_the_ground(pilot: Pilot, now: Situation) -> Pilot:
+    if not now.on_ground:
+        return pilot if pilot.airborne and pilot.grounded_since_s is None else replace(
+            pilot, airborne=True, grounded_since_s=None
+        )  # fmt: skip
+    return pilot if pilot.grounded_since_s is not None else replace(pilot, grounded_since_s=now.time_s)
+
+
+def _anchored(pilot: Pilot, now: Situation) -> Pilot:
+    """Take the place to stay at, once slow enough."""
+    if (
+        pilot.mode in (Mode.HOLD, Mode.LAND)
+        and pilot.anchor_ned is None
+        and math.hypot(*now.velocity_ned) < STOPPED
+    ):
+        return replace(pilot, anchor_ned=now.position_ned)
+    return pilot
+
+
+def _towards(anchor_ned: Vector, now: Situation) -> Vector:
+    north, east, down = (HOLD_GAIN * (a - p) for a, p in zip(anchor_ned, now.position_ned, strict=True))
+    slower = min(1.0, HOLD_SPEED / max(math.hypot(north, east), 1e-9))
+    return north * slower, east * slower, max(-HOLD_SPEED, min(HOLD_SPEED, down))

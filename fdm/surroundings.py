@@ -1,0 +1,93 @@
+"""What the world does to one vehicle: wind, gusts, turbulence, broken rotors, a degraded motor, blurred sensors.
+
+Time 0 of a scenario is mission start. Steady wind blows from boot; everything else begins with the mission, so that two
+flights with one seed meet the same, however long they took to get there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from fdm.faults import Vector, VehicleFaults
+from fdm.noise import Purpose, generator, gusts, white
+from fdm.vehicle import Vehicle
+from scenarios import Scenario, direction
+
+PERIOD_S = 0.05
+"""How often the air is renewed."""
+
+
+class Surroundings:
+    """Everything that disturbs the vehicle with this system id."""
+
+    def __init__(self, scenario: Scenario, *, vehicle: int, seed: int) -> None:
+        self._faults = VehicleFaults(scenario.fault, vehicle=vehicle, cruise=scenario.mission.cruise_m_s)
+        self._wind = _steady(scenario, vehicle)
+        self._turbulence = scenario.wind.turbulence if _is_in_the_wind(scenario, vehicle) else 0.0
+        self._air = _gusts(scenario, vehicle, seed)
+        self._blur = _blur(scenario, vehicle, seed)
+        self._rotors = self._faults.rotors(-math.inf)
+        self._start_s = math.inf
+
+    def settle(self, vehicle: Vehicle) -> None:
+        """Before the first step: the steady wind alone."""
+        vehicle.set_wind(self._wind)
+
+    def begin(self, vehicle: Vehicle, time_s: float) -> None:
+        """Mission start [s since boot]: from now on everything counts."""
+        self._start_s = time_s
+        if self._turbulence:
+            vehicle.set_turbulence(self._turbulence)
+
+    def renew(self, vehicle: Vehicle, time_s: float) -> None:
+        """Every PERIOD_S: new air, and rotors as their faults have them."""
+        if time_s < self._start_s:
+            return
+        if self._air is not None:
+            north, east = next(self._air)
+            vehicle.set_wind((self._wind[0] + north, self._wind[1] + east, 0.0))
+        rotors = self._faults.rotors(time_s - self._start_s)
+        for rotor, health in rotors.items():
+            if self._rotors[rotor] != health:
+                vehicle.set_rotor(rotor, efficiency=health.efficiency, speed_limit=health.speed_limit)
+        self._rotors = rotors
+
+    def flown(self, velocity_ned: Vector, time_s: float) -> Vector:
+        """What becomes of a velocity set-point [m/s]."""
+        return self._faults.flown(velocity_ned, time_s - self._start_s)
+
+    def measured(self, truth: tuple[float, ...], time_s: float) -> tuple[float, ...]:
+        """(n, e, d, vn, ve, vd) as this telemetry message reports it; one draw a message."""
+        if self._blur is None or time_s < self._start_s:
+            return truth
+        n, e, vn, ve = next(self._blur)
+        return truth[0] + n, truth[1] + e, truth[2], truth[3] + vn, truth[4] + ve, truth[5]
+
+
+def _is_in_the_wind(scenario: Scenario, vehicle: int) -> bool:
+    return scenario.wind.vehicles is None or vehicle in scenario.wind.vehicles
+
+
+def _steady(scenario: Scenario, vehicle: int) -> Vector:
+    """Velocity of the air [m/s]; weather names the direction it comes from."""
+    if not _is_in_the_wind(scenario, vehicle):
+        return 0.0, 0.0, 0.0
+    north, east = direction(scenario.wind.from_deg)
+    return -scenario.wind.speed_m_s * north, -scenario.wind.speed_m_s * east, 0.0
+
+
+def _gusts(scenario: Scenario, vehicle: int, seed: int) -> Iterator[tuple[float, ...]] | None:
+    noise = scenario.noise
+    if noise.gust_m_s == 0.0:
+        return None
+    rng = generator(seed, vehicle, Purpose.GUST)
+    return gusts(rng, deviation=noise.gust_m_s, correlation_s=noise.gust_time_s, dt=PERIOD_S)
+
+
+def _blur(scenario: Scenario, vehicle: int, seed: int) -> Iterator[tuple[float, ...]] | None:
+    noise = scenario.noise
+    if noise.position_m == noise.velocity_m_s == 0.0:
+        return None
+    x, v = noise.position_m, noise.velocity_m_s
+    return white(generator(seed, vehicle, Purpose.MEASUREMENT), (x, x, v, v))

@@ -1,0 +1,94 @@
+"""N vehicles in one air, on one step count."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pymap3d
+
+from fdm.endpoint import Endpoint
+from fdm.noise import Purpose, generator
+from fdm.surroundings import Surroundings
+from fdm.vehicle import Geodetic, Vehicle
+from scenarios import Scenario, offsets_ne
+
+SITE = Geodetic(41.1512, -81.4161, 320.0)
+"""Where scenarios begin: beside the airfield of Kent State University, the paper's home. Any other place does."""
+
+
+class World:
+    """The vehicles of a scenario, on their pads, disarmed, at step 0."""
+
+    def __init__(self, scenario: Scenario, *, seed: int = 1) -> None:
+        self.physics_hz = scenario.time.physics_hz
+        self.steps = 0
+        self._run_up_steps = scenario.time.ticks(scenario.mission.run_up_s) * scenario.time.steps_per_tick
+        self._mission_step: int | None = None
+        self.endpoints = [
+            _endpoint(scenario, system, pad, seed) for system, pad in enumerate(pads(scenario), start=1)
+        ]
+
+    def deliver(self, system: int, datagram: bytes) -> None:
+        """Hand a datagram to one vehicle, now."""
+        self.endpoints[system - 1].receive(datagram)
+
+    def step(self, steps: int) -> None:
+        """Let this many physics steps pass."""
+        target = self.steps + steps
+        if self._mission_step is None:
+            self._mission_step = self._first_motion()
+        if self._mission_step is not None and self.steps <= self._mission_step < target:
+            self._burst(self._mission_step - self.steps)
+            for endpoint in self.endpoints:
+                endpoint.begin_mission()
+        self._burst(target - self.steps)
+
+    def collect(self) -> list[tuple[int, int, bytes]]:
+        """What the vehicles sent since the last call: (step, system, frame), in the order of time, then of ids."""
+        sent = [
+            (step, endpoint.system, frame)
+            for endpoint in self.endpoints
+            for step, frame in endpoint.data_to_send()
+        ]
+        sent.sort(key=lambda entry: entry[0])
+        return sent
+
+    def _burst(self, steps: int) -> None:
+        if steps > 0:
+            for endpoint in self.endpoints:
+                endpoint.step(steps)
+            self.steps += steps
+
+    def _first_motion(self) -> int | None:
+        """The step of mission start, once a vehicle was asked to move: the run-up comes first."""
+        moved = [e.first_motion_step for e in self.endpoints if e.first_motion_step is not None]
+        return min(moved) + self._run_up_steps if moved else None
+
+
+def pads(scenario: Scenario) -> list[Geodetic]:
+    """Take-off places of all vehicles: the formation, its mean at SITE."""
+    offsets = offsets_ne(scenario)
+    latitude, longitude, altitude = pymap3d.ned2geodetic(
+        offsets[:, 0],
+        offsets[:, 1],
+        np.zeros(len(offsets)),
+        SITE.latitude_deg,
+        SITE.longitude_deg,
+        SITE.altitude_m,
+    )
+    return [
+        Geodetic(float(lat), float(lon), SITE.altitude_m)
+        for lat, lon, _ in zip(latitude, longitude, altitude, strict=True)
+    ]
+
+
+def _endpoint(scenario: Scenario, system: int, pad: Geodetic, seed: int) -> Endpoint:
+    vehicle = Vehicle(
+        home=pad,
+        yaw=math.radians(scenario.mission.leg[0].heading_deg),
+        physics_hz=scenario.time.physics_hz,
+        seed=int(generator(seed, system, Purpose.TURBULENCE).integers(2**31)),
+    )
+    surroundings = Surroundings(scenario, vehicle=system, seed=seed)
+    return Endpoint(vehicle, surroundings, system=system, origin=pad, physics_hz=scenario.time.physics_hz)

@@ -1,0 +1,1 @@
+"""The ground station: links, the one loop, the flight, recordings, commands."""

@@ -1,0 +1,66 @@
+"""What the ground station asks of a vehicle, in SI and before it is MAVLink."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Beat:
+    """A heartbeat of the ground station: its loop is alive."""
+
+
+@dataclass(frozen=True, slots=True)
+class RequestStream:
+    """Send this message regularly."""
+
+    message: int
+    interval_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class RequestMessage:
+    """Send this message once."""
+
+    message: int
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """Start the rotors."""
+
+
+@dataclass(frozen=True, slots=True)
+class TakeOff:
+    """Climb straight up."""
+
+    altitude_m: float
+    """Above mean sea level."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeMode:
+    """Fly in another mode, as DO_SET_MODE numbers it."""
+
+    main: int
+    sub: int
+
+
+@dataclass(frozen=True, slots=True)
+class Land:
+    """Come down where you are."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetVelocity:
+    """A velocity set-point."""
+
+    north: float
+    east: float
+    down: float
+    """m/s."""
+    yaw: float
+    """rad."""
+
+
+Command = Beat | RequestStream | RequestMessage | Arm | TakeOff | ChangeMode | Land | SetVelocity

@@ -1,0 +1,355 @@
+"""One flight, decided tick by tick: join, take off, take control, run up, fly the mission, land.
+
+`Flight` holds what never changes; everything that does is in `FlightState`, which goes in and comes out. So a recorded
+flight can be decided again from its frames. Nothing here knows whether the fleet is simulated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+import numpy.typing as npt
+
+from gcs import mission
+from gcs.autopilots import Px4
+from gcs.beliefs import trust_source
+from gcs.commands import Beat, Command, SetVelocity
+from gcs.control import settings
+from gcs.gate import Limits, admit
+from gcs.swarm_frame import SwarmFrame, swarm_frame
+from gcs.telemetry import Swarm
+from scenarios import Scenario, offsets_ne
+from trustr.controller import Decision, Observation, decide
+from trustr.leader import VirtualLeader
+
+Array = npt.NDArray[np.float64]
+Commands = list[tuple[int, Command]]
+
+STALE_NS, LOST_NS = 300_000_000, 1_000_000_000
+"""Age of telemetry from which a vehicle has weight 0, and from which it gets no more set-points."""
+RETRY_S = 1.0
+"""Between two askings for the same thing."""
+JOIN_S = 60.0
+"""All vehicles must be heard and ready by then."""
+LANDING_S = 90.0
+"""All vehicles must have landed by then."""
+STREAM_FIRST_S = 1.0
+"""Set-points flow this long before we ask for OFFBOARD."""
+STILL, LEVEL = 0.15, 0.2
+"""m/s and m: the fleet hovers in formation, and the run-up may begin."""
+HEIGHT_GAIN, CLIMB_SPEED = 0.8, 1.0
+"""1/s and m/s: altitude is held apart from the consensus."""
+RUN_UP_GAIN, RUN_UP_CAP = 0.5, 0.5
+"""1/s and m/s: every robot to its place beside the moving origin."""
+
+
+class Phase(Enum):
+    """What the flight is about."""
+
+    JOIN = "joining"
+    CLIMB = "taking off"
+    TAKE_CONTROL = "taking control"
+    RUN_UP = "running up"
+    MISSION = "mission"
+    LAND = "landing"
+    DONE = "done"
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What one vehicle was last asked for, and when."""
+
+    commands: tuple[Command, ...] = ()
+    tick: int = 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlightState:
+    """Everything that changes."""
+
+    tick: int
+    """The tick to be decided next."""
+    phase: Phase
+    phase_tick: int
+    """The phase's first tick."""
+    asked: tuple[Asked, ...]
+    """(N) what each vehicle was last asked for, so that asking again can wait."""
+    sent_ned: Array
+    """(N, 3) m/s: the set-points sent last."""
+    frame: SwarmFrame | None = None
+    """None until every vehicle has told where it is."""
+    shift_ne: Array | None = None
+    """(N, 2) m: add to a position in a vehicle's own frame, get the swarm's."""
+    mission_tick: int | None = None
+    problem: str | None = None
+    """Why the flight could not be completed."""
+
+    @property
+    def done(self) -> bool:
+        """Nothing is left to decide."""
+        return self.phase is Phase.DONE
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Diagnosis:
+    """What a tick decided, and from what."""
+
+    phase: Phase
+    mission_s: float
+    """Since mission start; NaN before."""
+    task: str
+    virtual: VirtualLeader | None
+    trust: Array
+    """(N,)"""
+    decision: Decision | None
+    """None outside the mission."""
+    position_ne: Array
+    """(N, 2) m in the swarm's frame; NaN until that is known."""
+    asked_ned: Array | None = None
+    """(N, 3) m/s that the controller wanted; None where no set-points flow."""
+    sent_ned: Array | None = None
+    """(N, 3) m/s after the gate."""
+    verdict: npt.NDArray[np.int8] | None = None
+    """(N,) of the gate."""
+    commanded: npt.NDArray[np.bool_] | None = None
+    """(N,) whom a set-point was sent to."""
+
+
+Step = tuple[FlightState, Commands, Diagnosis]
+
+
+class Flight:
+    """Decides one flight of a scenario."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self.ids = tuple(range(1, scenario.swarm.count + 1))
+        self.plan = mission.plan(scenario)
+        self._settings = settings(scenario)
+        self._offset_ne = offsets_ne(scenario)
+        self._trust = trust_source(scenario)
+        self._leader = mission.PROFILES[scenario.control.profile]
+        self._autopilot = Px4(height_m=scenario.swarm.altitude_m)
+        self._limits = Limits(scenario.limits.speed_m_s, scenario.limits.acceleration_m_s2)
+        self._period_s = scenario.time.period_s
+        self._run_up_ticks = scenario.time.ticks(scenario.mission.run_up_s)
+        self._phases: dict[Phase, Callable[[FlightState, Swarm, int], Step]] = {
+            Phase.JOIN: self._join,
+            Phase.CLIMB: self._climb,
+            Phase.TAKE_CONTROL: self._take_control,
+            Phase.RUN_UP: self._run_up,
+            Phase.MISSION: self._mission,
+            Phase.LAND: self._land,
+            Phase.DONE: self._land,
+        }
+
+    def start(self) -> FlightState:
+        """Before the first tick."""
+        n = len(self.ids)
+        return FlightState(
+            tick=0, phase=Phase.JOIN, phase_tick=0, asked=(Asked(),) * n, sent_ned=np.zeros((n, 3))
+        )
+
+    def __call__(self, state: FlightState, swarm: Swarm, events: Iterable[str], now_ns: int) -> Step:
+        """One tick. events: what an operator asked for since the last; "land" ends the flight."""
+        if "land" in events and state.phase not in (Phase.LAND, Phase.DONE):
+            state = _enter(state, Phase.LAND)
+        state = self._watch(state)
+        state, commands, diagnosis = self._phases[state.phase](state, swarm, now_ns)
+        if state.tick % self.scenario.time.ticks(1.0) == 0:
+            commands = [(system, Beat()) for system in self.ids] + commands
+        return replace(state, tick=state.tick + 1), commands, diagnosis
+
+    def _watch(self, state: FlightState) -> FlightState:
+        """Give up what takes too long."""
+        timeout_s = self.scenario.time.timeout_s
+        in_phase_s = (state.tick - state.phase_tick) * self._period_s
+        if state.phase is Phase.LAND:
+            if in_phase_s > LANDING_S:
+                return _failed(state, f"not every vehicle landed within {LANDING_S:g} s", Phase.DONE)
+        elif state.tick * self._period_s > timeout_s and state.phase is not Phase.DONE:
+            return _failed(state, f"the flight took longer than time.timeout_s = {timeout_s:g} s", Phase.LAND)
+        return state
+
+    def _join(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
+        missing = [system for row, system in enumerate(swarm.ids) if not self._autopilot.known(swarm, row)]
+        if not missing:
+            offset, run_up_m = self._offset_ne, self._run_up_m(self._run_up_ticks)
+            ahead = self.plan.segments[0].velocity_ne / self.scenario.mission.cruise_m_s
+            frame = swarm_frame(swarm.origin, swarm.position_ned[:, :2], offset, run_up_m * ahead)
+            shift = frame.to_ne(swarm.origin[:, 0], swarm.origin[:, 1])
+            return self._climb(replace(_enter(state, Phase.CLIMB), frame=frame, shift_ne=shift), swarm, now_ns)
+        if (state.tick - state.phase_tick) * self._period_s > JOIN_S:
+            names = ", ".join(map(str, missing))
+            problem = f"vehicle {names} was not heard, or not ready to arm, within {JOIN_S:g} s"
+            return self._land(_failed(state, problem, Phase.DONE), swarm, now_ns)
+        return self._ask(
+            state,
+            swarm,
+            lambda row: (
+                self._autopilot.subscribe()
+                if swarm.heartbeat_ns[row] > 0 and not self._autopilot.known(swarm, row)
+                else ()
+            ),
+        )
+
+    def _climb(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
+        if all(self._autopilot.hovering(swarm, row) for row in range(len(swarm.ids))):
+            return self._take_control(_enter(state, Phase.TAKE_CONTROL), swarm, now_ns)
+        return self._ask(state, swarm, lambda row: _some(self._autopilot.next_to_fly(swarm, row)))
+
+    def _take_control(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
+        rows = range(len(swarm.ids))
+        streaming_s = (state.tick - state.phase_tick) * self._period_s
+        height_error = np.abs(swarm.position_ned[:, 2] + self.scenario.swarm.altitude_m)
+        hovering = (np.linalg.norm(swarm.velocity_ned, axis=1) < STILL) & (height_error < LEVEL)
+        if streaming_s > STREAM_FIRST_S and all(self._autopilot.obeys(swarm, row) for row in rows) and hovering.all():
+            return self._run_up(_enter(state, Phase.RUN_UP), swarm, now_ns)
+        ask: Commands = []
+        if streaming_s >= STREAM_FIRST_S:
+            state, ask, _ = self._ask(state, swarm, lambda row: _some(self._autopilot.next_to_obey(swarm, row)))
+        state, commands, diagnosis = self._steer(state, swarm, np.zeros((len(swarm.ids), 2)), self._overview(state, swarm))
+        return state, ask + commands, diagnosis
+
+    def _run_up(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
+        """Bring the formation to cruise, so that time 0 finds it where the first leg begins, each robot in its place."""
+        into = state.tick - state.phase_tick
+        if into >= self._run_up_ticks:
+            state = replace(_enter(state, Phase.MISSION), mission_tick=state.tick)
+            return self._mission(state, swarm, now_ns)
+        cruise = self.scenario.mission.cruise_m_s
+        ahead = self.plan.segments[0].velocity_ne / cruise
+        _, speed = mission.run_up(cruise, self.scenario.mission.run_up_s, (into + 1) * self._period_s)
+        place = self._offset_ne - (self._run_up_m(self._run_up_ticks) - self._run_up_m(into)) * ahead
+        diagnosis = self._overview(state, swarm)
+        back = RUN_UP_GAIN * (place - diagnosis.position_ne)
+        too_far = np.maximum(np.hypot(back[:, 0], back[:, 1]) / RUN_UP_CAP, 1.0)
+        asked = speed * ahead + np.where(np.isfinite(back), back, 0.0) / too_far[:, None]
+        return self._steer(state, swarm, asked, diagnosis)
+
+    def _mission(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
+        time_s = self._mission_s(state)
+        if time_s >= self.plan.read_out_s - 1e-9:
+            state = _enter(state, Phase.LAND)
+            return self._land(state, swarm, now_ns)
+        obeying = np.array([self._autopilot.obeys(swarm, row) for row in range(len(swarm.ids))])
+        state = self._note_the_lost(state, swarm, obeying, now_ns)
+        diagnosis = self._overview(state, swarm)
+        heard = obeying & swarm.fresh(now_ns, within_ns=STALE_NS)
+        observation = Observation(diagnosis.position_ne, swarm.velocity_ned[:, :2], heard, diagnosis.trust)
+        assert diagnosis.virtual is not None
+        decision = decide(observation, diagnosis.virtual, self._settings)
+        commanded = obeying & swarm.fresh(now_ns, within_ns=LOST_NS)
+        return self._steer(state, swarm, decision.velocity_ne, replace(diagnosis, decision=decision), commanded)
+
+    def _land(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
+        heard = swarm.fresh(now_ns, within_ns=LOST_NS)
+        if not (swarm.armed & heard).any() and state.phase is not Phase.DONE:
+            state = _enter(state, Phase.DONE)
+        return self._ask(
+            state,
+            swarm,
+            lambda row: _some(self._autopilot.next_to_land(swarm, row)) if state.phase is Phase.LAND else (),
+        )
+
+    def _ask(self, state: FlightState, swarm: Swarm, what: Callable[[int], tuple[Command, ...]]) -> Step:
+        """Ask every vehicle for what it still lacks; for the same thing again only after RETRY_S."""
+        commands: Commands = []
+        asked = list(state.asked)
+        patience = self.scenario.time.ticks(RETRY_S)
+        for row, system in enumerate(swarm.ids):
+            wanted = what(row)
+            repeated = wanted == asked[row].commands and state.tick - asked[row].tick < patience
+            if wanted and not repeated:
+                asked[row] = Asked(wanted, state.tick)
+                commands += [(system, command) for command in wanted]
+        return replace(state, asked=tuple(asked)), commands, self._overview(state, swarm)
+
+    def _steer(
+        self,
+        state: FlightState,
+        swarm: Swarm,
+        velocity_ne: Array,
+        diagnosis: Diagnosis,
+        commanded: npt.NDArray[np.bool_] | None = None,
+    ) -> Step:
+        """Add height and heading, pass the gate, send."""
+        height_error = swarm.position_ned[:, 2] + self.scenario.swarm.altitude_m
+        down = np.clip(-HEIGHT_GAIN * height_error, -CLIMB_SPEED, CLIMB_SPEED)
+        asked = np.column_stack([velocity_ne, down])
+        sent, verdict = admit(asked, state.sent_ned, self._limits, dt=self._period_s)
+        if commanded is None:
+            commanded = np.ones(len(swarm.ids), bool)
+        yaw = self._heading(diagnosis.virtual)
+        commands: Commands = [
+            (system, SetVelocity(north, east, climb, yaw))
+            for system, (north, east, climb), fly in zip(swarm.ids, sent.tolist(), commanded.tolist(), strict=True)
+            if fly
+        ]
+        diagnosis = replace(diagnosis, asked_ned=asked, sent_ned=sent, verdict=verdict, commanded=commanded)
+        return replace(state, sent_ned=sent), commands, diagnosis
+
+    def _overview(self, state: FlightState, swarm: Swarm) -> Diagnosis:
+        """What every phase has to say."""
+        position = swarm.position_ned[:, :2] + (np.nan if state.shift_ne is None else state.shift_ne)
+        time_s = self._mission_s(state)
+        if math.isnan(time_s):
+            trust = np.ones(len(swarm.ids))
+            return Diagnosis(state.phase, time_s, self.plan.segments[0].task, None, trust, None, position)
+        return Diagnosis(
+            phase=state.phase,
+            mission_s=time_s,
+            task=self.plan.segment_at(time_s).task,
+            virtual=self._leader(self.plan, time_s),
+            trust=self._trust(time_s),
+            decision=None,
+            position_ne=position,
+        )
+
+    def _heading(self, virtual: VirtualLeader | None) -> float:
+        """Face the direction of travel; at its end, the last leg's."""
+        north, east = self.plan.segments[0].velocity_ne if virtual is None else virtual.velocity_ne
+        if math.hypot(north, east) < 0.1 * self.scenario.mission.cruise_m_s:
+            north, east = self.plan.segments[-1].velocity_ne
+        return math.atan2(east, north)
+
+    def _note_the_lost(
+        self, state: FlightState, swarm: Swarm, obeying: npt.NDArray[np.bool_], now_ns: int
+    ) -> FlightState:
+        """The first vehicle to fall silent, or to leave our mode, is why the flight is not complete; the others fly on."""
+        if state.problem is not None:
+            return state
+        silent = ~swarm.fresh(now_ns, within_ns=LOST_NS)
+        for row, system in enumerate(swarm.ids):
+            if silent[row]:
+                return replace(state, problem=f"vehicle {system} fell silent {self._mission_s(state):.1f} s into the mission")
+            if not obeying[row]:
+                words = f"vehicle {system} left the ground station's control {self._mission_s(state):.1f} s into the mission"
+                return replace(state, problem=words)
+        return state
+
+    def _mission_s(self, state: FlightState) -> float:
+        return math.nan if state.mission_tick is None else (state.tick - state.mission_tick) * self._period_s
+
+    def _run_up_m(self, ticks: int) -> float:
+        if self._run_up_ticks == 0:
+            return 0.0
+        run_up_s = self.scenario.mission.run_up_s
+        return mission.run_up(self.scenario.mission.cruise_m_s, run_up_s, ticks * self._period_s)[0]
+
+
+def _enter(state: FlightState, phase: Phase) -> FlightState:
+    """The first tick of a phase; nobody has been asked for anything in it."""
+    return replace(state, phase=phase, phase_tick=state.tick, asked=(Asked(),) * len(state.asked))
+
+
+def _failed(state: FlightState, problem: str, phase: Phase) -> FlightState:
+    return replace(_enter(state, phase), problem=state.problem or problem)
+
+
+def _some(command: Command | None) -> tuple[Command, ...]:
+    return () if command is None else (command,)

@@ -1,0 +1,43 @@
+"""A simulated world as link and clock at once: to wait is to let its physics step. Runs as fast as JSBSim, the same every time."""
+
+from __future__ import annotations
+
+from fdm.world import World
+from wire.frames import Frame, Framer
+
+EPOCH_NS = 1_577_836_800_000_000_000
+"""2020-01-01T00:00Z: when every lockstep flight begins."""
+
+
+class Lockstep:
+    """The vehicles of a world, over the very bytes that UDP would carry."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self._hz = world.physics_hz
+        self._framer = Framer()
+
+    def now(self) -> int:
+        """ns since 1970, from the step count."""
+        return self._time_ns(self._world.steps)
+
+    def sleep_until(self, time_ns: int) -> None:
+        """Step the world to the first step at or after this time."""
+        wanted = -((EPOCH_NS - time_ns) * self._hz // 1_000_000_000)
+        if wanted > self._world.steps:
+            self._world.step(wanted - self._world.steps)
+
+    def receive(self) -> list[Frame]:
+        """Every frame, with the time at which its vehicle sent it."""
+        return [
+            frame
+            for step, _system, data in self._world.collect()
+            for frame in self._framer.frames(self._time_ns(step), data)
+        ]
+
+    def send(self, system: int, frame: bytes) -> None:
+        """Delivered at once."""
+        self._world.deliver(system, frame)
+
+    def _time_ns(self, step: int) -> int:
+        return EPOCH_NS + step * 1_000_000_000 // self._hz

@@ -1,0 +1,88 @@
+"""MAVLink fields ↔ our dataclasses; the only file of the ground station that knows them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pymavlink.dialects.v20 import common as dialect
+
+from gcs.commands import (
+    Arm,
+    Beat,
+    ChangeMode,
+    Command,
+    Land,
+    RequestMessage,
+    RequestStream,
+    SetVelocity,
+    TakeOff,
+)
+from wire.frames import Sender
+from wire.payloads import PositionTarget, SET_POSITION_TARGET_LOCAL_NED, pack_position_target
+
+GROUND_SYSTEM, GROUND_COMPONENT = 255, 190
+"""Who we are on the wire."""
+AUTOPILOT, TRUTH = 1, 200
+"""Component ids of a vehicle: its autopilot, and the truth of a simulated one."""
+
+HEARTBEAT = dialect.MAVLINK_MSG_ID_HEARTBEAT
+SYS_STATUS = dialect.MAVLINK_MSG_ID_SYS_STATUS
+ATTITUDE = dialect.MAVLINK_MSG_ID_ATTITUDE
+LOCAL_POSITION_NED = dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED
+GLOBAL_POSITION_INT = dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
+GPS_GLOBAL_ORIGIN = dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN
+BATTERY_STATUS = dialect.MAVLINK_MSG_ID_BATTERY_STATUS
+EXTENDED_SYS_STATE = dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE
+STATUSTEXT = dialect.MAVLINK_MSG_ID_STATUSTEXT
+COMMAND_ACK = dialect.MAVLINK_MSG_ID_COMMAND_ACK
+SIM_STATE = dialect.MAVLINK_MSG_ID_SIM_STATE
+
+ARMED = dialect.MAV_MODE_FLAG_SAFETY_ARMED
+PREARM_CHECK = dialect.MAV_SYS_STATUS_PREARM_CHECK
+ON_GROUND = dialect.MAV_LANDED_STATE_ON_GROUND
+
+VELOCITY_WITH_YAW = 0x09C7
+"""type_mask: velocity and yaw count, all else is to be ignored."""
+
+
+class Encoder:
+    """Commands to one vehicle: a link of its own, with its own sequence numbers."""
+
+    def __init__(self, system: int) -> None:
+        self._system = system
+        self._sender = Sender(GROUND_SYSTEM, GROUND_COMPONENT)
+
+    def encode(self, command: Command, time_ms: int) -> bytes:
+        """One frame; time_ms: ms since the ground station's loop began."""
+        match command:
+            case SetVelocity(north, east, down, yaw):
+                target = PositionTarget(
+                    time_ms, 0.0, 0.0, 0.0, north, east, down, 0.0, 0.0, 0.0, yaw, 0.0,
+                    VELOCITY_WITH_YAW, self._system, AUTOPILOT, dialect.MAV_FRAME_LOCAL_NED,
+                )  # fmt: skip
+                return self._sender.frame(SET_POSITION_TARGET_LOCAL_NED, pack_position_target(target))
+            case Beat():
+                return self._sender.pack(
+                    dialect.MAVLink_heartbeat_message(
+                        dialect.MAV_TYPE_GCS, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
+                    )
+                )
+            case RequestStream(message, interval_s):
+                return self._long(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval_s * 1e6)
+            case RequestMessage(message):
+                return self._long(dialect.MAV_CMD_REQUEST_MESSAGE, message)
+            case Arm():
+                return self._long(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+            case TakeOff(altitude_m):
+                nan = math.nan
+                return self._long(dialect.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, nan, nan, nan, altitude_m)
+            case ChangeMode(main, sub):
+                return self._long(dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, main, sub)
+            case Land():
+                return self._long(dialect.MAV_CMD_NAV_LAND)
+
+    def _long(self, command: int, *params: float) -> bytes:
+        padded = [*map(float, params), *[0.0] * (7 - len(params))]
+        message: Any = dialect.MAVLink_command_long_message(self._system, AUTOPILOT, command, 0, *padded)
+        return self._sender.pack(message)

@@ -1,0 +1,103 @@
+"""How well a mission went: the metrics of the paper's Table II, on the truth where there is one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gcs.mission import plan
+from gcs.track import Track
+from scenarios import Scenario, offsets_ne
+
+Array = npt.NDArray[np.float64]
+
+AIRBORNE = 0.3
+"""m above home: lower robots do not count for separation."""
+CONTACT = 0.75
+"""m between centres: rotor discs of two vehicles touch."""
+DISTRUSTED = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """What a flight is judged by."""
+
+    heading_error_deg: float
+    """Absolute angle between the last leg and the way the healthy robots' mean went, hand-over to read-out."""
+    distance_to_target_m: float
+    """From the target to the mean of the healthy robots' places, formation taken off, at read-out."""
+    min_separation_m: float
+    """Closest that two airborne robots came, mission start to read-out."""
+    swarm_heading_error_deg: float
+    """As the first, of all robots."""
+    passed: bool
+    detected: dict[int, float]
+    """Seconds from a fault's onset until the vehicle's trust fell below 0.5, of those that were found."""
+    false_alarms: int
+    """Healthy vehicles whose trust was below 0.5 at any time."""
+
+
+def score(track: Track, scenario: Scenario) -> Score | None:
+    """Judge a mission; None if it ended before its read-out."""
+    path = plan(scenario)
+    if track.time_s[-1] < path.read_out_s - 1e-9:
+        return None
+    hand_over, read_out = (int(np.searchsorted(track.time_s, t - 1e-9)) for t in (path.hand_over_s, path.read_out_s))
+    healthy = healthy_robots(scenario)
+    place = track.position[..., :2] - offsets_ne(scenario)
+    leg = path.segments[-1].velocity_ne
+    error = abs(heading_error(place[hand_over, healthy].mean(0), place[read_out, healthy].mean(0), leg))
+    distance = float(np.linalg.norm(place[read_out, healthy].mean(0) - path.target_ne))
+    separation = min_separation(track.position[: read_out + 1])
+    expect = scenario.expect
+    return Score(
+        heading_error_deg=error,
+        distance_to_target_m=distance,
+        min_separation_m=separation,
+        swarm_heading_error_deg=abs(heading_error(place[hand_over].mean(0), place[read_out].mean(0), leg)),
+        passed=bool(
+            error <= expect.heading_error_deg
+            and distance <= expect.distance_to_target_m
+            and separation >= expect.min_separation_m
+        ),
+        detected=_detected(track, scenario),
+        false_alarms=int((track.trust[:, healthy] < DISTRUSTED).any(axis=0).sum()),
+    )
+
+
+def healthy_robots(scenario: Scenario) -> npt.NDArray[np.bool_]:
+    """(N,) robots that no fault ever strikes."""
+    healthy = np.ones(scenario.swarm.count, bool)
+    for fault in scenario.fault:
+        healthy[fault.vehicle - 1] = False
+    return healthy
+
+
+def heading_error(start_ne: Array, end_ne: Array, wanted_ne: Array) -> float:
+    """Signed angle from the wanted direction to the chord, degrees, clockwise, in [−180, 180]."""
+    north, east = end_ne - start_ne
+    flown, wanted = math.atan2(east, north), math.atan2(wanted_ne[1], wanted_ne[0])
+    return math.degrees(math.remainder(flown - wanted, math.tau))
+
+
+def min_separation(position: Array) -> float:
+    """Smallest 3-D distance [m] of any two airborne robots over (T, N, 3) positions; infinite where none fly together."""
+    grounded = position[..., 2] < AIRBORNE
+    closest = math.inf
+    for first in range(position.shape[1] - 1):
+        gap = np.linalg.norm(position[:, first + 1 :] - position[:, first, None], axis=-1)
+        gap[grounded[:, first + 1 :] | grounded[:, first, None]] = np.inf
+        closest = min(closest, float(gap.min()))
+    return closest
+
+
+def _detected(track: Track, scenario: Scenario) -> dict[int, float]:
+    found: dict[int, float] = {}
+    for fault in scenario.fault:
+        below = track.time_s[(track.trust[:, fault.vehicle - 1] < DISTRUSTED) & (track.time_s >= fault.onset_s - 1e-9)]
+        if below.size and fault.vehicle not in found:
+            found[fault.vehicle] = round(float(below[0]) - fault.onset_s, 6)
+    return found

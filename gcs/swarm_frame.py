@@ -1,0 +1,50 @@
+"""One horizontal frame for vehicles that each have their own origin.
+
+The swarm's origin is where the first leg begins: the mean of the formation as it stands, moved ahead by the run-up.
+Height is each vehicle's own, above its home.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import pymap3d
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SwarmFrame:
+    """A plane that touches the Earth near the fleet; 100 m from there it is good to a millimetre."""
+
+    latitude_deg: float
+    longitude_deg: float
+    """Where the plane touches."""
+    metres_per_degree: Array
+    """(2,) along the meridian and along the parallel."""
+    origin_ne: Array
+    """(2,) m, the swarm's origin from there."""
+
+    def to_ne(self, latitude_deg: Array, longitude_deg: Array) -> Array:
+        """(N, 2) m north, east of the swarm's origin, of (N,) geodetic places."""
+        degrees = np.stack([latitude_deg - self.latitude_deg, longitude_deg - self.longitude_deg], axis=1)
+        return np.asarray(degrees * self.metres_per_degree - self.origin_ne)
+
+
+def swarm_frame(origin: Array, position_ne: Array, offset_ne: Array, run_up_ne: Array) -> SwarmFrame:
+    """The frame of a fleet about to take off.
+
+    origin: (N, 3) of each vehicle's own origin, latitude, longitude [degrees], altitude [m];  position_ne: (N, 2) m from
+    it;  offset_ne: (N, 2) m, the formation;  run_up_ne: (2,) m from here to where the first leg begins.
+    """
+    latitude, longitude = float(origin[0, 0]), float(origin[0, 1])
+    tiny = 1e-4  # degrees, some 10 m: the curve of the Earth is 0.01 mm there
+    north, _, _ = pymap3d.geodetic2ned(latitude + tiny, longitude, 0.0, latitude, longitude, 0.0)
+    _, east, _ = pymap3d.geodetic2ned(latitude, longitude + tiny, 0.0, latitude, longitude, 0.0)
+    touching = SwarmFrame(latitude, longitude, np.array([north, east]) / tiny, np.zeros(2))
+    places = touching.to_ne(origin[:, 0], origin[:, 1]) + position_ne
+    return SwarmFrame(
+        latitude, longitude, touching.metres_per_degree, (places - offset_ne).mean(axis=0) + run_up_ne
+    )

@@ -1,0 +1,90 @@
+"""What is kept of a mission for its score and its picture: who was where, who was trusted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gcs.flight import Flight
+from gcs.loop import Tick
+from gcs.truth import Truth
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """A mission, tick by tick, from its start to the read-out: T ticks, N vehicles."""
+
+    time_s: Array
+    """(T,) since mission start."""
+    position: Array
+    """(T, N, 3) m: north, east of the swarm's origin, height above home."""
+    trust: Array
+    """(T, N) in [0, 1]."""
+    virtual_ne: Array
+    """(T, 2) m: the virtual leader."""
+    measured: bool
+    """True where positions are telemetry, because no simulation told the truth."""
+
+    @staticmethod
+    def of(points: list[Point]) -> Track:
+        """A track of points in the order of time."""
+        return Track(
+            time_s=np.array([point.time_s for point in points]),
+            position=np.array([point.position for point in points]),
+            trust=np.array([point.trust for point in points]),
+            virtual_ne=np.array([point.virtual_ne for point in points]),
+            measured=any(point.measured for point in points),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Point:
+    """One tick of a track."""
+
+    time_s: float
+    position: Array
+    """(N, 3)"""
+    trust: Array
+    """(N,)"""
+    virtual_ne: Array
+    """(2,)"""
+    measured: bool
+
+
+class Tracker:
+    """A `Record` that keeps the track in memory."""
+
+    def __init__(self, flight: Flight) -> None:
+        self._truth = Truth(flight.ids)
+        self._read_out_s = flight.plan.read_out_s
+        self._points: list[Point] = []
+
+    def tick(self, tick: Tick) -> None:
+        """Keep this tick, if it belongs to the mission."""
+        self._truth.read(tick.frames)
+        point = point_of(tick, self._truth)
+        if point is not None and (not self._points or self._points[-1].time_s < self._read_out_s - 1e-9):
+            self._points.append(point)
+
+    @property
+    def track(self) -> Track | None:
+        """All that was kept; None where the mission never began."""
+        return Track.of(self._points) if self._points else None
+
+
+def point_of(tick: Tick, truth: Truth) -> Point | None:
+    """Where everyone is at a tick; None before the mission."""
+    diagnosis, frame = tick.diagnosis, tick.state.frame
+    if diagnosis.virtual is None or frame is None:
+        return None
+    if truth.known:
+        position = truth.position(frame, tick.swarm)
+    else:
+        position = np.column_stack([diagnosis.position_ne, -tick.swarm.position_ned[:, 2]])
+    return Point(
+        diagnosis.mission_s, position, diagnosis.trust, diagnosis.virtual.position_ne, measured=not truth.known
+    )

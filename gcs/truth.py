@@ -1,0 +1,44 @@
+"""The truth of simulated vehicles (SIM_STATE of component 200), for whoever records and scores; nothing that decides reads it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from gcs import messages
+from gcs.swarm_frame import SwarmFrame
+from gcs.telemetry import Swarm
+from wire.frames import Frame
+from wire.payloads import unpack_sim_state
+
+Array = npt.NDArray[np.float64]
+
+
+class Truth:
+    """The last true state that each vehicle told."""
+
+    def __init__(self, ids: Sequence[int]) -> None:
+        self._rows = {system: row for row, system in enumerate(ids)}
+        self._geodetic = np.full((len(ids), 3), np.nan)
+        self.velocity_ned = np.full((len(ids), 3), np.nan)
+        """(N, 3) m/s."""
+
+    def read(self, frames: Iterable[Frame]) -> None:
+        """Take in what came."""
+        for frame in frames:
+            if frame.component == messages.TRUTH and frame.message == messages.SIM_STATE and frame.system in self._rows:
+                state, row = unpack_sim_state(frame.payload), self._rows[frame.system]
+                self._geodetic[row] = state.lat_int / 1e7, state.lon_int / 1e7, state.alt
+                self.velocity_ned[row] = state.vn, state.ve, state.vd
+
+    @property
+    def known(self) -> bool:
+        """Whether every vehicle has told its truth: real ones never do."""
+        return bool(np.isfinite(self._geodetic).all())
+
+    def position(self, frame: SwarmFrame, swarm: Swarm) -> Array:
+        """(N, 3) m: north, east of the swarm's origin, height above each vehicle's home."""
+        ne = frame.to_ne(self._geodetic[:, 0], self._geodetic[:, 1])
+        return np.column_stack([ne, self._geodetic[:, 2] - swarm.origin[:, 2]])
