@@ -5,7 +5,7 @@ velocity and a yaw and needs no Python between physics steps. Step it in bursts 
 """
 
 from dataclasses import dataclass
-from math import atan2, cos, degrees, isfinite, sin
+from math import atan2, cos, degrees, isfinite, radians, sin
 from typing import Final
 
 import jsbsim
@@ -13,6 +13,7 @@ import jsbsim
 import aircraft as models
 
 FOOT: Final = 0.3048  # m
+EARTH_RATE: Final = 7.292115e-5  # rad/s, WGS-84
 ROTORS: Final = 4
 TOP_SPEED: Final = 50.0  # m/s, more than the aircraft reaches in a dive with its motors running
 
@@ -24,6 +25,7 @@ _INTEGRATORS: Final = (
     "pitch-torque",
     "yaw-torque",
 )
+_CONTROLLER_OUTPUTS: Final = ("control/thrust", "mixer/roll-plus-pitch", "control/yaw-torque")
 
 Vector = tuple[float, float, float]
 
@@ -117,10 +119,11 @@ class Vehicle:
         self._write("control/yaw-sp", yaw)
         self._write("battery/initial-charge", charge)
         self._bind()
-        self._hold_down.set_double_value(0.0 if height_m > 0 else 1.0)
+        self._hold(height_m <= 0)
         self._ground_enabled = True
         if not fdm.run_ic():
             raise FlightModelDiverged(f"the {aircraft} could not be put at {home}")
+        self._weight = self._apparent_gravity()
 
     def _bind(self) -> None:
         """Look up once every property that is read or written in flight."""
@@ -132,8 +135,9 @@ class Vehicle:
         self._rate = [node(f"velocities/{axis}-rad_sec") for axis in "pqr"]
         self._place = [node(f"position/{name}") for name in ("lat-geod-deg", "long-gc-deg", "geod-alt-ft")]
         self._height = node("position/h-agl-ft")
+        # The controller's outputs too: the mixer takes NaN for 0, so a poisoned one only stops the motors.
+        self._health = [self._height, self._rate[0], *map(node, _CONTROLLER_OUTPUTS)]
         self._ground = node("simulation/models/FGGroundReactions/enabled")
-        self._gravity = node("accelerations/gravity-ft_sec2")
         self._ground_force = node("forces/fbz-gear-lbs")
         self._hold_down = node("forces/hold-down")
         self._armed = node("control/armed")
@@ -145,6 +149,12 @@ class Vehicle:
         self._rotor_speeds = [node(f"rotor/speed-{rotor}") for rotor in range(ROTORS)]
         self._efficiency = [node(f"fault/m{rotor}-efficiency") for rotor in range(ROTORS)]
         self._speed_limit = [node(f"fault/m{rotor}-speed-limit") for rotor in range(ROTORS)]
+
+    def _apparent_gravity(self) -> float:
+        """m/s² that the ground carries: gravitation less the centrifugal part of the Earth's turn."""
+        gravitation = self._node("accelerations/gravity-ft_sec2").get_double_value() * FOOT
+        radius = self._node("position/radius-to-vehicle-ft").get_double_value() * FOOT
+        return gravitation - radius * (EARTH_RATE * cos(radians(self._home.latitude_deg))) ** 2
 
     def _node(self, name: str) -> jsbsim.FGPropertyNode:
         """The property's node. JSBSim would invent an unknown one and read 0, so that is an error here."""
@@ -159,16 +169,34 @@ class Vehicle:
     def step(self, n: int) -> None:
         """Fly `n` physics steps. Raises FlightModelDiverged if the state is not finite afterwards."""
         self._watch_ground(n)
+        if self.armed or self._held:
+            self._run(n)
+        else:
+            self._settle(n)
+        if not isfinite(sum(node.get_double_value() for node in self._health)):
+            raise FlightModelDiverged(
+                f"the flight model diverged before step {self.steps}: its state is not finite"
+            )
+
+    def _run(self, n: int) -> None:
         run = self._fdm.run
         for _ in range(n):
             run()
         self.steps += n
-        if not isfinite(self._height.get_double_value() + self._rate[0].get_double_value()):
-            raise FlightModelDiverged(
-                f"the flight model diverged before step {self.steps}: its state is not finite"
-            )
-        if not self.armed and self._at_rest():
-            self._hold_down.set_double_value(1.0)
+
+    def _settle(self, n: int) -> None:
+        """Fly on without motors, and hold the vehicle down once it lies still: contacts creep in wind.
+
+        It looks at every tenth step of the flight, so that the length of bursts changes nothing.
+        """
+        for _ in range(n):
+            self._run(1)
+            if self.steps % 10 == 0 and not self._held and self._at_rest():
+                self._hold(True)
+
+    def _hold(self, held: bool) -> None:
+        self._held = held
+        self._hold_down.set_double_value(held)
 
     def _watch_ground(self, n: int) -> None:
         """Switch contacts off where `n` steps cannot reach the ground: they cost a fifth of a step."""
@@ -179,7 +207,7 @@ class Vehicle:
             self._ground.set_double_value(enabled)
 
     def _at_rest(self) -> bool:
-        """Landed and still; then it is held down, because contacts creep some mm/s in wind."""
+        """Landed and slower than 5 cm/s."""
         still = 0.05 / FOOT
         return self.landed and all(abs(node.get_double_value()) < still for node in self._velocity)
 
@@ -208,9 +236,9 @@ class Vehicle:
 
     def _specific_force(self, roll: float, pitch: float) -> Vector:
         """What an accelerometer reads. Held down, JSBSim reports no force, though the ground carries it."""
-        if not self._hold_down.get_double_value():
+        if not self._held:
             return _vector(self._force, FOOT)
-        g = self._gravity.get_double_value() * FOOT
+        g = self._weight
         return g * sin(pitch), -g * sin(roll) * cos(pitch), -g * cos(roll) * cos(pitch)
 
     def position_velocity(self) -> tuple[float, float, float, float, float, float]:
@@ -230,7 +258,7 @@ class Vehicle:
         """Let the rotors turn. The controller's integrators start from nothing."""
         for integrator in self._integrators:
             integrator.set_double_value(0.0)
-        self._hold_down.set_double_value(0.0)
+        self._hold(False)
         self._armed.set_double_value(1.0)
         self.armed = True
 
