@@ -20,7 +20,7 @@ Array = npt.NDArray[np.float64]
 
 READ_OUT_AFTER_S = 2.0
 """Results are read this long after the virtual leader would reach the target at cruise."""
-TURN_S = 1.2
+TURN_S = 1.6
 """Recommended profile: time from one velocity to the next, at corners and at the target."""
 SWING_S = 3.0
 """Recommended profile: time from an emergency call until the virtual leader is on its new leg."""

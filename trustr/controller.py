@@ -32,6 +32,10 @@ class Settings:
     """m/s."""
     response_s: float
     """s: first-order response of the vehicles, for the feed-forward of the virtual leader's acceleration; 0 is none."""
+    swarm_feedback: bool
+    """Leaders steer the mean of the robots they trust (δx and δu of eq. 11 are the swarm's), not themselves."""
+    formation_gain: float
+    """1/s: every robot back to its place among those it trusts; 0 in the paper."""
     range_m: float
     """R of eq. 13."""
     best_range_m: float
@@ -80,22 +84,31 @@ def decide(observation: Observation, virtual: VirtualLeader, settings: Settings)
     A robot that is not heard has weight exactly 0 with every other, and is commanded to stand still.
     """
     heard = observation.heard & np.isfinite(observation.position_ne).all(1) & np.isfinite(observation.velocity_ne).all(1)
-    position = observation.position_ne
-    velocity = observation.velocity_ne if heard.all() else np.where(heard[:, None], observation.velocity_ne, 0.0)
+    position = np.where(heard[:, None], observation.position_ne, 0.0)
+    velocity = np.where(heard[:, None], observation.velocity_ne, 0.0)
     graph = neighbours(position, heard, range_m=settings.range_m)
     weights = RULES[settings.rule](graph, observation.trust, settings)
-    command = weighted_mean(graph, weights, velocity)
-    leaders = settings.leaders
-    followers_a_leader = np.count_nonzero(observation.trust >= settings.threshold) / len(leaders)
-    command[leaders] += navigational_feedback(
-        position[leaders],
-        velocity[leaders],
-        settings.offset_ne[leaders],
-        virtual,
-        c1=settings.c1,
-        c2=settings.c2,
-        cap=settings.feedback_cap,
-        lead_s=settings.response_s * followers_a_leader,
-    )
+    consensus = weighted_mean(graph, weights, velocity)
+    command = consensus.copy()
+    leaders, place = settings.leaders, position - settings.offset_ne
+    if settings.swarm_feedback:
+        # Followers know no path: whatever the leaders' feedback sums up to shears the formation and stays, and the mean is
+        # off by it. So leaders answer for the mean, and the formation closes behind them (docs/recommended-profile.md).
+        swarm_place = weighted_mean(graph, weights, place)
+        followers_a_leader = np.count_nonzero(heard & (observation.trust >= settings.threshold)) / len(leaders)
+        command -= settings.formation_gain * (place - swarm_place)
+        command[leaders] += navigational_feedback(
+            swarm_place[leaders],
+            consensus[leaders],
+            virtual,
+            c1=settings.c1,
+            c2=settings.c2,
+            cap=settings.feedback_cap,
+            lead_s=settings.response_s * followers_a_leader,
+        )
+    else:
+        command[leaders] += navigational_feedback(
+            place[leaders], velocity[leaders], virtual, c1=settings.c1, c2=settings.c2, cap=settings.feedback_cap
+        )
     command += separation(graph, position, radius=settings.separation_radius, gain=settings.separation_gain)
-    return Decision(command if heard.all() else np.where(heard[:, None], command, 0.0), graph, weights)
+    return Decision(np.where(heard[:, None], command, 0.0), graph, weights)

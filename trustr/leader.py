@@ -25,27 +25,19 @@ class VirtualLeader:
 
 
 def navigational_feedback(
-    position_ne: Array,
-    velocity_ne: Array,
-    offset_ne: Array,
-    virtual: VirtualLeader,
-    *,
-    c1: float,
-    c2: float,
-    cap: float,
-    lead_s: float = 0.0,
+    place_ne: Array, velocity_ne: Array, virtual: VirtualLeader, *, c1: float, c2: float, cap: float, lead_s: float = 0.0
 ) -> Array:
-    """u^γ of eq. 11 for each of L leaders: (L, 2) m/s, never longer than `cap`.
+    """u^γ of eq. 11 for each of L leaders, (L, 2) m/s; what answers errors is never longer than `cap`.
 
-    u^γ = −c1 (x_i − offset_i − x_γ) − c2 (v_i − v_γ) + lead_s a_γ, all measured, so that the accumulated errors δx and δu
-    of the paper are in it already. (L, 2) positions m, velocities m/s and offsets m; c1 in 1/s, c2 without unit.
+    u^γ = −c1 (x_i − x_γ + δx) − c2 (v_i − v_γ + δu) + lead_s a_γ
+
+    place_ne: (L, 2) m, x_i + δx with the formation's offset taken off;  velocity_ne: (L, 2) m/s, v_i + δu.
+    Measured of the leader itself, both hold all accumulated error already (δx = δu = 0); taken over the robots it trusts,
+    δx and δu are the shift of the swarm against the leader. c1 in 1/s, c2 without unit.
     lead_s: feed-forward of the virtual leader's acceleration [s], our addition; the paper has none. Consensus over N robots
     that answer in τ seconds gives their mean velocity v̄̇ = (L/N) u^γ / τ, so τ N / L makes the mean accelerate as it does.
     """
-    wanted = (
-        -c1 * (position_ne - offset_ne - virtual.position_ne)
-        - c2 * (velocity_ne - virtual.velocity_ne)
-        + lead_s * virtual.acceleration_ne
-    )
+    wanted = -c1 * (place_ne - virtual.position_ne) - c2 * (velocity_ne - virtual.velocity_ne)
     length = np.hypot(wanted[:, 0], wanted[:, 1])
-    return np.asarray(wanted * np.minimum(1.0, cap / np.maximum(length, 1e-12))[:, None])
+    capped = wanted * np.minimum(1.0, cap / np.maximum(length, 1e-12))[:, None]
+    return np.asarray(capped + lead_s * virtual.acceleration_ne)

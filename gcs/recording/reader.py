@@ -1,0 +1,100 @@
+"""Reads recordings back: their scenario, their mission, and their frames tick by tick."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import orjson
+from mcap.exceptions import McapError
+from mcap.reader import NonSeekingReader, make_reader
+
+from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
+from gcs.recording.writer import METADATA, SCENARIO
+from gcs.track import Point, Track
+from scenarios import Scenario
+from wire.frames import Frame, Framer
+
+RECORD_SIZE_LIMIT = 64 << 20
+
+
+class UnreadableRecording(ValueError):
+    """A file that is no recording of ours, in one sentence."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Flown:
+    """What a recording tells of a mission."""
+
+    path: Path
+    scenario: Scenario
+    metadata: dict[str, str]
+    track: Track | None
+
+
+class RecordedTick(NamedTuple):
+    """One turn of the recorded loop."""
+
+    time_ns: int
+    received: list[Frame]
+    sent: list[bytes]
+    events: tuple[str, ...]
+
+
+def read(path: Path) -> Flown:
+    """Scenario, metadata and mission of a recording. Raises UnreadableRecording."""
+    try:
+        with path.open("rb") as stream:
+            reader = make_reader(stream, record_size_limit=RECORD_SIZE_LIMIT)
+            scenario = next(a.data for a in reader.iter_attachments() if a.name == SCENARIO)
+            metadata = next(m.metadata for m in reader.iter_metadata() if m.name == METADATA)
+            points = list(_points(reader))
+    except (OSError, McapError, StopIteration, struct.error, orjson.JSONDecodeError) as error:
+        raise UnreadableRecording(f"{path}: not a readable recording of a flight: {error or type(error).__name__}") from None
+    return Flown(path, Scenario.model_validate_json(scenario), metadata, Track.of(points) if points else None)
+
+
+def _points(reader: Any) -> Iterator[Point]:
+    """The mission's ticks, in order."""
+    mission: dict[int, dict[str, Any]] = {}
+    trust: dict[int, list[float]] = {}
+    pose: dict[int, list[list[float]]] = {}
+    for _schema, channel, message in reader.iter_messages(topics=["/mission", "/trust", "/truth/pose"]):
+        content = orjson.loads(message.data)
+        match channel.topic:
+            case "/mission":
+                mission[content["tick"]] = content
+            case "/trust":
+                trust[content["tick"]] = content["trust"]
+            case "/truth/pose":
+                pose[content["tick"]] = content["position_m"]
+    for tick in sorted(mission.keys() & pose.keys()):
+        there = mission[tick]
+        yield Point(
+            time_s=there["mission_s"],
+            position=np.array(pose[tick]),
+            trust=np.array(trust[tick]),
+            virtual_ne=np.array([there["north_m"], there["east_m"]]),
+            measured=False,
+        )
+
+
+def ticks(path: Path) -> Iterator[RecordedTick]:
+    """The frames of a recording as the loop took and sent them, in the order of the file."""
+    framer, received, sent = Framer(), list[Frame](), list[bytes]()
+    own = f"/mavlink/{GROUND_SYSTEM}_{GROUND_COMPONENT}/raw"
+    with path.open("rb") as stream:
+        reader = NonSeekingReader(stream, record_size_limit=RECORD_SIZE_LIMIT)
+        for _schema, channel, message in reader.iter_messages(log_time_order=False):
+            if channel.topic == own:
+                sent.append(message.data)
+            elif channel.message_encoding == "mavlink":
+                received += framer.frames(message.log_time, message.data)
+            elif channel.topic == "/tick":
+                content = orjson.loads(message.data)
+                yield RecordedTick(message.log_time, received, sent, tuple(content["events"]))
+                received, sent = [], []

@@ -1,0 +1,157 @@
+"""Our own topics of a recording: frozen dataclasses that are their own JSON, and their JSON Schemas.
+
+NaN is written as null. Lists over vehicles are in the order of their system ids.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Vector = npt.NDArray[Any]
+"""One number for each vehicle."""
+Table = npt.NDArray[Any]
+"""A row for each vehicle."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TickTopic:
+    """/tick: one turn of the loop. The raw frames between two of these are what it received and sent."""
+
+    number: int
+    frames: int
+    """How many received frames it consumed."""
+    lateness_ns: int
+    """After its deadline."""
+    phase: str
+    events: list[str]
+    """What an operator asked for."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MissionTopic:
+    """/mission: where the virtual leader is."""
+
+    tick: int
+    mission_s: float
+    """Since mission start."""
+    task: str
+    north_m: float
+    east_m: float
+    velocity_north_m_s: float
+    velocity_east_m_s: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrustTopic:
+    """/trust: what the ground station believes of each vehicle, 0 to 1."""
+
+    tick: int
+    mission_s: float
+    trust: Vector
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WeightsTopic:
+    """/weights: row i is how much robot i heeds each robot, eq. 17; rows sum to 1."""
+
+    tick: int
+    mission_s: float
+    weights: Table
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SetpointTopic:
+    """/setpoint: velocities (north, east, down) m/s that the controller asked for and that passed the gate."""
+
+    tick: int
+    asked: Table
+    sent: Table
+    verdict: Vector
+    """0 as asked, 1 slowed, 2 refused."""
+    commanded: Vector
+    """False for vehicles that were sent none."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StateTopic:
+    """/uav/<sysid>/state: one vehicle as telemetry tells it."""
+
+    tick: int
+    position_m: Vector
+    """North, east of the swarm's origin, down from its own."""
+    velocity_m_s: Vector
+    attitude_rad: Vector
+    """Roll, pitch, yaw."""
+    age_s: float
+    """Of position and velocity."""
+    custom_mode: int
+    armed: bool
+    battery: float
+    """0 to 1."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseTopic:
+    """/truth/pose: where a simulation's vehicles really are."""
+
+    tick: int
+    mission_s: float
+    position_m: Table
+    """North, east of the swarm's origin, height above home."""
+    velocity_m_s: Table
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FaultTopic:
+    """/truth/fault: a fault of the scenario begins or ends."""
+
+    mission_s: float
+    vehicle: int
+    kind: str
+    active: bool
+    definition: dict[str, Any]
+    """As the scenario has it."""
+
+
+NUMBER: dict[str, Any] = {"type": ["number", "null"]}
+JSON_TYPES: dict[str, dict[str, Any]] = {
+    "int": {"type": "integer"},
+    "float": NUMBER,
+    "str": {"type": "string"},
+    "bool": {"type": "boolean"},
+    "list[str]": {"type": "array", "items": {"type": "string"}},
+    "dict[str, Any]": {"type": "object"},
+    "Vector": {"type": "array", "items": {"type": ["number", "boolean", "null"]}},
+    "Table": {"type": "array", "items": {"type": "array", "items": NUMBER}},
+}
+
+
+def schema(topic: type) -> dict[str, Any]:
+    """The JSON Schema of a topic's class, with its sentences as descriptions."""
+    said = _sentences(topic)
+    return {
+        "title": topic.__name__.removesuffix("Topic"),
+        "description": inspect.cleandoc(topic.__doc__ or ""),
+        "type": "object",
+        "properties": {
+            field.name: JSON_TYPES[str(field.type)] | ({"description": said[field.name]} if field.name in said else {})
+            for field in fields(topic)
+        },
+        "required": [field.name for field in fields(topic)],
+    }
+
+
+def _sentences(topic: type) -> dict[str, str]:
+    """Field name → the string literal under it."""
+    return dict(re.findall(r'^    (\w+): .*\n    """(.*?)"""', inspect.getsource(topic), flags=re.MULTILINE))
+
+
+def contiguous(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """As the JSON writer takes it."""
+    return np.ascontiguousarray(array)

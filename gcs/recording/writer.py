@@ -1,0 +1,186 @@
+"""Writes a recording while a flight goes on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO
+
+import numpy as np
+import orjson
+from mcap.writer import CompressionType, Writer
+
+from gcs.loop import Clock, Link, Tick
+from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
+from gcs.recording import topics
+from gcs.truth import Truth
+from scenarios import Fault, Scenario
+from wire.frames import Frame
+
+FLUSH_NS = 80_000_000
+"""A killed process loses no more of the recording than this and one tick."""
+OPTIONS = orjson.OPT_SERIALIZE_NUMPY
+SCENARIO = "scenario.json"
+METADATA = "trustr"
+
+
+class RecordingError(OSError):
+    """A recording that cannot be written, in one sentence."""
+
+
+class Recorder:
+    """One MCAP file: raw frames through a `Tap`, our topics tick by tick."""
+
+    def __init__(self, path: Path, scenario: Scenario, *, start_ns: int, metadata: dict[str, str]) -> None:
+        self.path = path
+        self._file = _open(path)
+        self._writer = Writer(self._file, compression=CompressionType.LZ4)
+        self._writer.start(profile="", library="trustr")
+        self._writer.add_metadata(METADATA, metadata)
+        self._writer.add_attachment(
+            start_ns, start_ns, SCENARIO, "application/json", scenario.model_dump_json(indent=1).encode()
+        )
+        self._raw: dict[tuple[int, int], int] = {}
+        self._topics: dict[str, int] = {}
+        self._truth = Truth(range(1, scenario.swarm.count + 1))
+        self._faults = [(fault, _FaultWatch()) for fault in scenario.fault]
+        self._flushed_ns = start_ns
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        """Whatever happened, the file is whole."""
+        self.close()
+
+    def close(self) -> None:
+        """Write the summary."""
+        if not self._file.closed:
+            self._writer.finish()
+            self._file.close()
+
+    def add_metadata(self, name: str, values: dict[str, str]) -> None:
+        """What is known only in the end, and is no part of the promise of same seed, same bytes."""
+        self._writer.add_metadata(name, values)
+
+    def raw(self, time_ns: int, system: int, component: int, frame: bytes) -> None:
+        """A frame, under the name of its sender."""
+        channel = self._raw.get((system, component))
+        if channel is None:
+            topic = f"/mavlink/{system}_{component}/raw"
+            channel = self._raw[system, component] = self._writer.register_channel(topic, "mavlink", 0)
+        self._writer.add_message(channel, time_ns, frame, time_ns)
+
+    def tick(self, tick: Tick) -> None:
+        """Our own topics of one turn of the loop."""
+        number, time_ns, diagnosis = tick.number, tick.time_ns, tick.diagnosis
+        self._truth.read(tick.frames)
+        self._states(tick)
+        if diagnosis.sent_ned is not None:
+            self._write(
+                time_ns,
+                "/setpoint",
+                topics.SetpointTopic(
+                    number, topics.contiguous(diagnosis.asked_ned), diagnosis.sent_ned, diagnosis.verdict,  # type: ignore[arg-type]
+                    diagnosis.commanded,  # type: ignore[arg-type]
+                ),
+            )  # fmt: skip
+        if diagnosis.virtual is not None:
+            self._mission(tick)
+        if self._truth.known and tick.state.frame is not None:
+            position = self._truth.position(tick.state.frame, tick.swarm)
+            pose = topics.PoseTopic(number, diagnosis.mission_s, position, self._truth.velocity_ned)
+            self._write(time_ns, "/truth/pose", pose)
+        turn = topics.TickTopic(number, len(tick.frames), tick.lateness_ns, diagnosis.phase.value, list(tick.events))
+        self._write(time_ns, "/tick", turn)
+        if time_ns - self._flushed_ns >= FLUSH_NS:
+            self._writer.flush()
+            self._flushed_ns = time_ns
+
+    def _mission(self, tick: Tick) -> None:
+        number, time_ns, diagnosis = tick.number, tick.time_ns, tick.diagnosis
+        virtual, mission_s = diagnosis.virtual, diagnosis.mission_s
+        assert virtual is not None
+        place = topics.MissionTopic(
+            number, mission_s, diagnosis.task, *virtual.position_ne.tolist(), *virtual.velocity_ne.tolist()
+        )
+        self._write(time_ns, "/mission", place)
+        self._write(time_ns, "/trust", topics.TrustTopic(number, mission_s, diagnosis.trust))
+        if diagnosis.decision is not None:
+            weights = diagnosis.decision.graph.dense(diagnosis.decision.weights)
+            self._write(time_ns, "/weights", topics.WeightsTopic(number, mission_s, weights))
+        for fault, watch in self._faults:
+            if watch.turned(fault.active(mission_s)):
+                self._write(time_ns, "/truth/fault", _fault_topic(fault, mission_s))
+
+    def _states(self, tick: Tick) -> None:
+        swarm = tick.swarm
+        position = np.column_stack([tick.diagnosis.position_ne, swarm.position_ned[:, 2]])
+        age_s = (tick.time_ns - swarm.position_ns) / 1e9
+        for row, system in enumerate(swarm.ids):
+            state = topics.StateTopic(
+                tick=tick.number,
+                position_m=position[row],
+                velocity_m_s=swarm.velocity_ned[row],
+                attitude_rad=swarm.attitude_rpy[row],
+                age_s=float(age_s[row]) if swarm.position_ns[row] > 0 else float("nan"),
+                custom_mode=int(swarm.custom_mode[row]),
+                armed=bool(swarm.armed[row]),
+                battery=float(swarm.battery[row]),
+            )
+            self._write(tick.time_ns, f"/uav/{system}/state", state)
+
+    def _write(self, time_ns: int, topic: str, message: Any) -> None:
+        channel = self._topics.get(topic)
+        if channel is None:
+            kind = type(message)
+            schema = self._writer.register_schema(
+                f"trustr.{kind.__name__.removesuffix('Topic')}", "jsonschema", orjson.dumps(topics.schema(kind))
+            )
+            channel = self._topics[topic] = self._writer.register_channel(topic, "json", schema)
+        self._writer.add_message(channel, time_ns, orjson.dumps(message, option=OPTIONS), time_ns)
+
+
+class Tap:
+    """A link that records what passes through it."""
+
+    def __init__(self, link: Link, clock: Clock, recorder: Recorder) -> None:
+        self._link = link
+        self._clock = clock
+        self._recorder = recorder
+
+    def receive(self) -> list[Frame]:
+        """What came, recorded under its time of arrival."""
+        frames = self._link.receive()
+        for frame in frames:
+            self._recorder.raw(frame.time_ns, frame.system, frame.component, frame.raw)
+        return frames
+
+    def send(self, system: int, frame: bytes) -> None:
+        """What goes, recorded before it does."""
+        self._recorder.raw(self._clock.now(), GROUND_SYSTEM, GROUND_COMPONENT, frame)
+        self._link.send(system, frame)
+
+
+class _FaultWatch:
+    """Remembers whether a fault was active, to tell when that turns."""
+
+    def __init__(self) -> None:
+        self._active = False
+
+    def turned(self, active: bool) -> bool:
+        changed, self._active = active != self._active, active
+        return changed
+
+
+def _fault_topic(fault: Fault, mission_s: float) -> topics.FaultTopic:
+    definition = fault.model_dump()
+    return topics.FaultTopic(mission_s, fault.vehicle, definition["kind"], fault.active(mission_s), definition)
+
+
+def _open(path: Path) -> BinaryIO:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path.open("wb")
+    except OSError as error:
+        raise RecordingError(f"{path}: the recording cannot be written: {error.strerror or error}") from None
