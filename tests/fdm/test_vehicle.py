@@ -165,7 +165,7 @@ def test_it_turns_the_short_way_round():
     assert degrees(yaws[-1]) == pytest.approx(-170, abs=0.5)
 
 
-@pytest.mark.parametrize("hz", [100, 200, 500])
+@pytest.mark.parametrize("hz", [100, 200, 500, 1000])
 def test_step_rates_fly_alike(hz):
     def track(rate):
         vehicle = flying(hz=rate)
@@ -439,3 +439,18 @@ def test_it_takes_off_again_after_landing():
     vehicle.step(250 * 4)
     assert not vehicle.landed
     assert vehicle.position_velocity()[2] < -2.5
+
+
+def test_arming_forgets_the_wind_of_the_last_flight():
+    vehicle = flying(1.0, seconds=6, wind=(12.0, 0.0, 0.0))
+    vehicle.set_velocity((0.0, 0.0, 0.5), 0.0)
+    while not vehicle.landed:
+        vehicle.step(10)
+    vehicle.disarm()
+    vehicle.set_wind((0.0, 0.0, 0.0))
+    vehicle.step(250 * 4)
+    north = vehicle.position_velocity()[0]
+    vehicle.set_velocity((0.0, 0.0, -1.0), 0.0)
+    vehicle.arm()
+    vehicle.step(250 * 2)
+    assert vehicle.position_velocity()[0] == pytest.approx(north, abs=0.01)
