@@ -98,6 +98,16 @@ class Endpoint:
         """Time 0 of the scenario is now: faults, noise, gusts and turbulence count from here."""
         self._surroundings.begin(self.vehicle, self.time_s)
 
+    def end_mission(self) -> None:
+        """The flight is over: the next movement from outside begins another."""
+        self.first_motion_step = None
+        self._surroundings.end(self.vehicle)
+
+    @property
+    def next_event_step(self) -> int:
+        """The next step at which there is something to do or to send."""
+        return self._schedule.next_step
+
     def receive(self, datagram: bytes) -> None:
         """Take in what came over the link, now."""
         for frame in self.framer.frames(0, datagram):

@@ -22,11 +22,12 @@ class Surroundings:
     """Everything that disturbs the vehicle with this system id."""
 
     def __init__(self, scenario: Scenario, *, vehicle: int, seed: int) -> None:
+        self._scenario, self._system, self._seed = scenario, vehicle, seed
         self._faults = VehicleFaults(scenario.fault, vehicle=vehicle, cruise=scenario.mission.cruise_m_s)
         self._wind = _steady(scenario, vehicle)
         self._turbulence = scenario.wind.turbulence if _is_in_the_wind(scenario, vehicle) else 0.0
-        self._air = _gusts(scenario, vehicle, seed)
-        self._blur = _blur(scenario, vehicle, seed)
+        self._air: Iterator[tuple[float, ...]] | None = None
+        self._blur: Iterator[tuple[float, ...]] | None = None
         self._rotors = self._faults.rotors(-math.inf)
         self._start_s = math.inf
 
@@ -37,8 +38,18 @@ class Surroundings:
     def begin(self, vehicle: Vehicle, time_s: float) -> None:
         """Mission start [s since boot]: from now on everything counts."""
         self._start_s = time_s
-        if self._turbulence:
-            vehicle.set_turbulence(self._turbulence)
+        self._air = _gusts(self._scenario, self._system, self._seed)
+        self._blur = _blur(self._scenario, self._system, self._seed)
+        vehicle.set_turbulence(self._turbulence)
+
+    def end(self, vehicle: Vehicle) -> None:
+        """The flight is over; the next begins as this one did."""
+        self._start_s = math.inf
+        vehicle.set_turbulence(0.0)
+        vehicle.set_wind(self._wind)
+        for rotor in self._rotors:
+            vehicle.set_rotor(rotor)
+        self._rotors = self._faults.rotors(-math.inf)
 
     def renew(self, vehicle: Vehicle, time_s: float) -> None:
         """Every PERIOD_S: new air, and rotors as their faults have them."""
@@ -59,7 +70,7 @@ class Surroundings:
 
     def measured(self, truth: tuple[float, ...], time_s: float) -> tuple[float, ...]:
         """(n, e, d, vn, ve, vd) as this telemetry message reports it; one draw a message."""
-        if self._blur is None or time_s < self._start_s:
+        if time_s < self._start_s or self._blur is None:
             return truth
         n, e, vn, ve = next(self._blur)
         return truth[0] + n, truth[1] + e, truth[2], truth[3] + vn, truth[4] + ve, truth[5]

@@ -43,6 +43,15 @@ class World:
             for endpoint in self.endpoints:
                 endpoint.begin_mission()
         self._burst(target - self.steps)
+        if self._mission_step is not None and not any(endpoint.pilot.armed for endpoint in self.endpoints):
+            self._mission_step = None
+            for endpoint in self.endpoints:
+                endpoint.end_mission()
+
+    @property
+    def next_event_step(self) -> int:
+        """The next step at which any vehicle has something to do or to send."""
+        return min(endpoint.next_event_step for endpoint in self.endpoints)
 
     def collect(self) -> list[tuple[int, int, bytes]]:
         """What the vehicles sent since the last call: (step, system, frame), in the order of time, then of ids."""

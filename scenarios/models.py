@@ -185,8 +185,8 @@ class Control(Section):
     separation_radius_m: NotNegative = 2.0
     separation_gain: NotNegative = 0.3
     """1/s: metres inside the radius to speed apart."""
-    response_time_s: Positive = 0.3
-    """Identified first-order time constant of the vehicles' velocity response; `recommended` scales with it."""
+    response_time_s: Positive = 0.47
+    """Mean lag of the vehicles' answer to a velocity step, ∫ (1 − v/v_step) dt; `recommended` scales with it."""
 
 
 class Network(Section):

@@ -6,6 +6,7 @@ headers, is done here. Tests hold both to the same bytes. Page: https://mavlink.
 
 from __future__ import annotations
 
+import re
 import struct
 from typing import Any, NamedTuple
 
@@ -105,6 +106,26 @@ class Framer:
             self.bad_crc += 1
             return None
         return Frame(time_ns, system, component, message, data[at + header : stop], data[at : stop + tail])
+
+
+def target_system(frame: Frame) -> int:
+    """The system a frame is meant for; 0 is all of them."""
+    at = _TARGET_AT.get(frame.message)
+    return 0 if at is None or at >= len(frame.payload) else frame.payload[at]
+
+
+def _target_at(kind: Any) -> int | None:
+    """Where in the payload a message has its target_system."""
+    if "target_system" not in kind.ordered_fieldnames:
+        return None
+    place = kind.ordered_fieldnames.index("target_system")
+    before = re.findall(r"\d*[a-zA-Z]", kind.unpacker.format)[:place]
+    return struct.calcsize("<" + "".join(before))
+
+
+_TARGET_AT = {
+    number: at for number, kind in dialect.mavlink_map.items() if (at := _target_at(kind)) is not None
+}
 
 
 def decode(frame: Frame) -> Any:

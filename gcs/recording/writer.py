@@ -43,7 +43,8 @@ class Recorder:
         self._raw: dict[tuple[int, int], int] = {}
         self._topics: dict[str, int] = {}
         self._truth = Truth(range(1, scenario.swarm.count + 1))
-        self._faults = [(fault, _FaultWatch()) for fault in scenario.fault]
+        self._faults = scenario.fault
+        self._active = [False] * len(scenario.fault)
         self._flushed_ns = start_ns
 
     def __enter__(self) -> Recorder:
@@ -109,8 +110,9 @@ class Recorder:
         if diagnosis.decision is not None:
             weights = diagnosis.decision.graph.dense(diagnosis.decision.weights)
             self._write(time_ns, "/weights", topics.WeightsTopic(number, mission_s, weights))
-        for fault, watch in self._faults:
-            if watch.turned(fault.active(mission_s)):
+        for index, fault in enumerate(self._faults):
+            if fault.active(mission_s) != self._active[index]:
+                self._active[index] = not self._active[index]
                 self._write(time_ns, "/truth/fault", _fault_topic(fault, mission_s))
 
     def _states(self, tick: Tick) -> None:
@@ -160,17 +162,6 @@ class Tap:
         """What goes, recorded before it does."""
         self._recorder.raw(self._clock.now(), GROUND_SYSTEM, GROUND_COMPONENT, frame)
         self._link.send(system, frame)
-
-
-class _FaultWatch:
-    """Remembers whether a fault was active, to tell when that turns."""
-
-    def __init__(self) -> None:
-        self._active = False
-
-    def turned(self, active: bool) -> bool:
-        changed, self._active = active != self._active, active
-        return changed
 
 
 def _fault_topic(fault: Fault, mission_s: float) -> topics.FaultTopic:

@@ -1,0 +1,89 @@
+"""The `fdm` command: parse, build, serve."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from typing import Annotated, Literal
+
+from cyclopts import App, Parameter
+
+app = App(name="fdm", help="Fly a scenario's vehicles in JSBSim, each behind a MAVLink endpoint.", version="0.1.0")
+
+
+@app.command
+def serve(
+    scenario: str,
+    /,
+    *,
+    to: str = "udpout:127.0.0.1:14550",
+    ports: Literal["shared", "separate"] = "shared",
+    speed: float = 1.0,
+    seed: int = 1,
+    set_: Annotated[tuple[str, ...], Parameter(name="--set", negative=())] = (),
+) -> int:
+    """Serve the vehicles of a scenario over UDP until Ctrl-C.
+
+    Parameters
+    ----------
+    scenario
+        A scenario's name (see `gcs scenarios`), or the path of a TOML file.
+    to
+        Where the vehicles send: udpout:HOST:PORT.
+    ports
+        shared: all to that port. separate: vehicle i to PORT + i - 1.
+    speed
+        Simulated seconds a second.
+    seed
+        Of noise, gusts and turbulence.
+    set_
+        section.key=value, as often as you like: changes one key of the scenario.
+    """
+    from fdm.server import Server
+    from fdm.world import World
+    from scenarios import ScenarioError, load
+    from wire.connection import ConnectionRefused, parse
+
+    if speed <= 0:
+        return _refuse(f"--speed {speed}: must be above 0")
+    try:
+        loaded = load(scenario, overrides=set_)
+        connections = parse(to)
+        if len(connections) > 1:
+            return _refuse(f"--to {to}: one port; with --ports separate the others follow it")
+        server = Server(World(loaded, seed=seed), connections[0], ports=ports, speed=speed)
+    except (ScenarioError, ConnectionRefused) as error:
+        return _refuse(str(error))
+    stopped = False
+
+    def stop(_signal: int, _frame: object) -> None:
+        nonlocal stopped
+        stopped = True
+
+    signal.signal(signal.SIGINT, stop)
+    signal.signal(signal.SIGTERM, stop)
+    _say(f"{loaded.swarm.count} vehicles are sending to {connections[0]} ({ports} ports, speed {speed:g}); Ctrl-C stops")
+    warned = False
+    while not stopped:
+        server.turn()
+        if server.behind_s > 1.0 and not warned:
+            warned = True
+            _say(f"this machine is too slow for --speed {speed:g}: the simulation lags {server.behind_s:.1f} s and counting")
+    server.close()
+    _say("stopped")
+    return 0
+
+
+def _refuse(words: str) -> int:
+    _say(f"fdm: {words}")
+    return 2
+
+
+def _say(words: str) -> None:
+    sys.stderr.write(words + "\n")
+    sys.stderr.flush()
+
+
+def main() -> None:
+    """Entry point."""
+    sys.exit(app())
