@@ -62,13 +62,17 @@ def serve(
 
     signal.signal(signal.SIGINT, stop)
     signal.signal(signal.SIGTERM, stop)
-    _say(f"{loaded.swarm.count} vehicles are sending to {connections[0]} ({ports} ports, speed {speed:g}); Ctrl-C stops")
+    _say(
+        f"{loaded.swarm.count} vehicles are sending to {connections[0]} ({ports} ports, speed {speed:g}); Ctrl-C stops"
+    )
     warned = False
     while not stopped:
         server.turn()
         if server.behind_s > 1.0 and not warned:
             warned = True
-            _say(f"this machine is too slow for --speed {speed:g}: the simulation lags {server.behind_s:.1f} s and counting")
+            _say(
+                f"this machine is too slow for --speed {speed:g}: the simulation lags {server.behind_s:.1f} s and counting"
+            )
     server.close()
     _say("stopped")
     return 0

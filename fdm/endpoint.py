@@ -135,7 +135,7 @@ class Endpoint:
 
     def _situation(self) -> Situation:
         n, e, d, vn, ve, vd = self.vehicle.position_velocity()
-        return Situation(self.time_s, (n, e, d), (vn, ve, vd), self.vehicle.state().attitude_rpy[2], self.vehicle.landed)
+        return Situation(self.time_s, (n, e, d), (vn, ve, vd), self.vehicle.yaw, self.vehicle.landed)
 
     def _serve(self, due: list[int]) -> None:
         now = self._situation()
@@ -200,8 +200,8 @@ class Endpoint:
             return None
         velocity = target.vx, target.vy, target.vz
         if target.coordinate_frame == BODY_NED:
-            velocity = _turned(velocity, self.vehicle.state().attitude_rpy[2])
-            yaw = None if yaw is None else yaw + self.vehicle.state().attitude_rpy[2]
+            velocity = _turned(velocity, self.vehicle.yaw)
+            yaw = None if yaw is None else yaw + self.vehicle.yaw
         elif target.coordinate_frame != LOCAL_NED:
             return None
         return Setpoint(self.time_s, velocity, yaw, yaw_rate)
@@ -216,9 +216,7 @@ class Endpoint:
         handler = self._commands.get(command.command)
         result = UNSUPPORTED if handler is None else handler(command)
         self._send(
-            self._reporter.acknowledge(
-                command.command, result, to_system=frame.system, to_component=frame.component
-            )
+            self._reporter.acknowledge(command.command, result, to_system=frame.system, to_component=frame.component)
         )
 
     def _arm_disarm(self, command: Any) -> int:

@@ -177,9 +177,7 @@ def advance(pilot: Pilot, now: Situation, failsafe: Failsafe) -> Outcome:
         return Outcome(replace(pilot, armed=False), words=((Severity.INFO, "Disarmed: no take-off"),))
     if pilot.mode is Mode.TAKEOFF and pilot.anchor_ned is not None:
         if abs(now.position_ned[2] - pilot.anchor_ned[2]) < REACHED:
-            return Outcome(
-                replace(pilot, mode=Mode.HOLD), words=((Severity.INFO, "Take-off height reached"),)
-            )
+            return Outcome(replace(pilot, mode=Mode.HOLD), words=((Severity.INFO, "Take-off height reached"),))
     elif pilot.mode is Mode.OFFBOARD and not _hears_setpoints(pilot, now, failsafe):
         lost = replace(pilot, mode=Mode.HOLD, anchor_ned=None, land_at_s=now.time_s + failsafe.land_after_s)
         return Outcome(lost, words=((Severity.CRITICAL, "Set-points lost: holding"),))
@@ -226,11 +224,7 @@ def _watch_the_ground(pilot: Pilot, now: Situation) -> Pilot:
 
 def _anchored(pilot: Pilot, now: Situation) -> Pilot:
     """Take the place to stay at, once slow enough."""
-    if (
-        pilot.mode in (Mode.HOLD, Mode.LAND)
-        and pilot.anchor_ned is None
-        and math.hypot(*now.velocity_ned) < STOPPED
-    ):
+    if pilot.mode in (Mode.HOLD, Mode.LAND) and pilot.anchor_ned is None and math.hypot(*now.velocity_ned) < STOPPED:
         return replace(pilot, anchor_ned=now.position_ned)
     return pilot
 

@@ -88,9 +88,7 @@ class Reporter:
     def acknowledge(self, command: int, result: int, *, to_system: int, to_component: int) -> bytes:
         """COMMAND_ACK to whoever asked."""
         return self._autopilot.pack(
-            dialect.MAVLink_command_ack_message(
-                command, result, target_system=to_system, target_component=to_component
-            )
+            dialect.MAVLink_command_ack_message(command, result, target_system=to_system, target_component=to_component)
         )
 
     def word(self, severity: Severity, text: str) -> bytes:
@@ -187,8 +185,7 @@ class Reporter:
 
     def _autopilot_version(self, _pilot: Pilot, _now: Situation, _measured: tuple[float, ...]) -> bytes:
         capabilities = (
-            dialect.MAV_PROTOCOL_CAPABILITY_MAVLINK2
-            | dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
+            dialect.MAV_PROTOCOL_CAPABILITY_MAVLINK2 | dialect.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
         )
         return self._autopilot.pack(
             dialect.MAVLink_autopilot_version_message(

@@ -174,9 +174,7 @@ class Vehicle:
         else:
             self._settle(n)
         if not isfinite(sum(node.get_double_value() for node in self._health)):
-            raise FlightModelDiverged(
-                f"the flight model diverged before step {self.steps}: its state is not finite"
-            )
+            raise FlightModelDiverged(f"the flight model diverged before step {self.steps}: its state is not finite")
 
     def _run(self, n: int) -> None:
         run = self._fdm.run
@@ -253,6 +251,11 @@ class Vehicle:
             ve.get_double_value() * FOOT,
             vd.get_double_value() * FOOT,
         )
+
+    @property
+    def yaw(self) -> float:
+        """Heading, rad in [0, 2π)."""
+        return self._attitude[2].get_double_value()
 
     def arm(self) -> None:
         """Let the rotors turn. The controller's integrators start from nothing."""

@@ -25,9 +25,7 @@ class World:
         self.steps = 0
         self._run_up_steps = scenario.time.ticks(scenario.mission.run_up_s) * scenario.time.steps_per_tick
         self._mission_step: int | None = None
-        self.endpoints = [
-            _endpoint(scenario, system, pad, seed) for system, pad in enumerate(pads(scenario), start=1)
-        ]
+        self.endpoints = [_endpoint(scenario, system, pad, seed) for system, pad in enumerate(pads(scenario), start=1)]
 
     def deliver(self, system: int, datagram: bytes) -> None:
         """Hand a datagram to one vehicle, now."""
@@ -56,9 +54,7 @@ class World:
     def collect(self) -> list[tuple[int, int, bytes]]:
         """What the vehicles sent since the last call: (step, system, frame), in the order of time, then of ids."""
         sent = [
-            (step, endpoint.system, frame)
-            for endpoint in self.endpoints
-            for step, frame in endpoint.data_to_send()
+            (step, endpoint.system, frame) for endpoint in self.endpoints for step, frame in endpoint.data_to_send()
         ]
         sent.sort(key=lambda entry: entry[0])
         return sent

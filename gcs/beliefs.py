@@ -42,7 +42,5 @@ def _ratings(scenario: Scenario) -> TrustSource:
     faulty = np.zeros(scenario.swarm.count, bool)
     for fault in scenario.fault:
         faulty[fault.vehicle - 1] = True
-    fixed = study_trust(
-        faulty, faulty_rating=scenario.trust.faulty_rating, others_rating=scenario.trust.others_rating
-    )
+    fixed = study_trust(faulty, faulty_rating=scenario.trust.faulty_rating, others_rating=scenario.trust.others_rating)
     return lambda _time_s: fixed

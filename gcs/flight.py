@@ -150,9 +150,7 @@ class Flight:
     def start(self) -> FlightState:
         """Before the first tick."""
         n = len(self.ids)
-        return FlightState(
-            tick=0, phase=Phase.JOIN, phase_tick=0, asked=(Asked(),) * n, sent_ned=np.zeros((n, 3))
-        )
+        return FlightState(tick=0, phase=Phase.JOIN, phase_tick=0, asked=(Asked(),) * n, sent_ned=np.zeros((n, 3)))
 
     def __call__(self, state: FlightState, swarm: Swarm, events: Iterable[str], now_ns: int) -> Step:
         """One tick. events: what an operator asked for since the last; "land" ends the flight."""
@@ -212,7 +210,9 @@ class Flight:
         ask: Commands = []
         if streaming_s >= STREAM_FIRST_S:
             state, ask, _ = self._ask(state, swarm, lambda row: _some(self._autopilot.next_to_obey(swarm, row)))
-        state, commands, diagnosis = self._steer(state, swarm, np.zeros((len(swarm.ids), 2)), self._overview(state, swarm))
+        state, commands, diagnosis = self._steer(
+            state, swarm, np.zeros((len(swarm.ids), 2)), self._overview(state, swarm)
+        )
         return state, ask + commands, diagnosis
 
     def _run_up(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
@@ -326,7 +326,10 @@ class Flight:
         silent = ~swarm.fresh(now_ns, within_ns=LOST_NS)
         for row, system in enumerate(swarm.ids):
             if silent[row]:
-                return replace(state, problem=f"vehicle {system} fell silent {self._mission_s(state):.1f} s into the mission")
+                return replace(
+                    state,
+                    problem=f"vehicle {system} fell silent {self._mission_s(state):.1f} s into the mission",
+                )
             if not obeying[row]:
                 words = f"vehicle {system} left the ground station's control {self._mission_s(state):.1f} s into the mission"
                 return replace(state, problem=words)

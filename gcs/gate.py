@@ -44,6 +44,4 @@ def _shorten(vectors: Array, most: float) -> Array:
     """Vectors (N, 3) with their horizontal and vertical parts no longer than `most`."""
     horizontal = np.hypot(vectors[:, 0], vectors[:, 1])
     shorter = np.minimum(1.0, most / np.maximum(horizontal, 1e-12))
-    return np.stack(
-        [vectors[:, 0] * shorter, vectors[:, 1] * shorter, np.clip(vectors[:, 2], -most, most)], axis=1
-    )
+    return np.stack([vectors[:, 0] * shorter, vectors[:, 1] * shorter, np.clip(vectors[:, 2], -most, most)], axis=1)

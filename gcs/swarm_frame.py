@@ -45,6 +45,4 @@ def swarm_frame(origin: Array, position_ne: Array, offset_ne: Array, run_up_ne: 
     _, east, _ = pymap3d.geodetic2ned(latitude, longitude + tiny, 0.0, latitude, longitude, 0.0)
     touching = SwarmFrame(latitude, longitude, np.array([north, east]) / tiny, np.zeros(2))
     places = touching.to_ne(origin[:, 0], origin[:, 1]) + position_ne
-    return SwarmFrame(
-        latitude, longitude, touching.metres_per_degree, (places - offset_ne).mean(axis=0) + run_up_ne
-    )
+    return SwarmFrame(latitude, longitude, touching.metres_per_degree, (places - offset_ne).mean(axis=0) + run_up_ne)

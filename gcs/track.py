@@ -86,5 +86,9 @@ def point_of(tick: Tick, truth: Truth) -> Point | None:
     else:
         position = np.column_stack([diagnosis.position_ne, -tick.swarm.position_ned[:, 2]])
     return Point(
-        diagnosis.mission_s, position, diagnosis.trust, diagnosis.virtual.position_ne, measured=not truth.known
+        diagnosis.mission_s,
+        position,
+        diagnosis.trust,
+        diagnosis.virtual.position_ne,
+        measured=not truth.known,
     )

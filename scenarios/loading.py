@@ -92,7 +92,10 @@ def _clause(problem: Any, tables: dict[str, Any]) -> str:
     return f"{key} = {problem['input']!r}: {message}"
 
 
-_TAGS = ("motor_degradation", "rotor")  # pydantic puts the tag of a union into the path; people did not type it
+_TAGS = (
+    "motor_degradation",
+    "rotor",
+)  # pydantic puts the tag of a union into the path; people did not type it
 
 
 def _allowed_keys(tables: dict[str, Any], location: Sequence[Any]) -> list[str]:

@@ -83,7 +83,9 @@ def decide(observation: Observation, virtual: VirtualLeader, settings: Settings)
 
     A robot that is not heard has weight exactly 0 with every other, and is commanded to stand still.
     """
-    heard = observation.heard & np.isfinite(observation.position_ne).all(1) & np.isfinite(observation.velocity_ne).all(1)
+    heard = (
+        observation.heard & np.isfinite(observation.position_ne).all(1) & np.isfinite(observation.velocity_ne).all(1)
+    )
     position = np.where(heard[:, None], observation.position_ne, 0.0)
     velocity = np.where(heard[:, None], observation.velocity_ne, 0.0)
     graph = neighbours(position, heard, range_m=settings.range_m)
@@ -108,7 +110,12 @@ def decide(observation: Observation, virtual: VirtualLeader, settings: Settings)
         )
     else:
         command[leaders] += navigational_feedback(
-            place[leaders], velocity[leaders], virtual, c1=settings.c1, c2=settings.c2, cap=settings.feedback_cap
+            place[leaders],
+            velocity[leaders],
+            virtual,
+            c1=settings.c1,
+            c2=settings.c2,
+            cap=settings.feedback_cap,
         )
     command += separation(graph, position, radius=settings.separation_radius, gain=settings.separation_gain)
     return Decision(np.where(heard[:, None], command, 0.0), graph, weights)

@@ -25,7 +25,14 @@ class VirtualLeader:
 
 
 def navigational_feedback(
-    place_ne: Array, velocity_ne: Array, virtual: VirtualLeader, *, c1: float, c2: float, cap: float, lead_s: float = 0.0
+    place_ne: Array,
+    velocity_ne: Array,
+    virtual: VirtualLeader,
+    *,
+    c1: float,
+    c2: float,
+    cap: float,
+    lead_s: float = 0.0,
 ) -> Array:
     """u^γ of eq. 11 for each of L leaders, (L, 2) m/s; what answers errors is never longer than `cap`.
 

@@ -123,9 +123,7 @@ def _target_at(kind: Any) -> int | None:
     return struct.calcsize("<" + "".join(before))
 
 
-_TARGET_AT = {
-    number: at for number, kind in dialect.mavlink_map.items() if (at := _target_at(kind)) is not None
-}
+_TARGET_AT = {number: at for number, kind in dialect.mavlink_map.items() if (at := _target_at(kind)) is not None}
 
 
 def decode(frame: Frame) -> Any:

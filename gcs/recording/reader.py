@@ -54,7 +54,9 @@ def read(path: Path) -> Flown:
             metadata = next(m.metadata for m in reader.iter_metadata() if m.name == METADATA)
             points = list(_points(reader))
     except (OSError, McapError, StopIteration, struct.error, orjson.JSONDecodeError) as error:
-        raise UnreadableRecording(f"{path}: not a readable recording of a flight: {error or type(error).__name__}") from None
+        raise UnreadableRecording(
+            f"{path}: not a readable recording of a flight: {error or type(error).__name__}"
+        ) from None
     return Flown(path, Scenario.model_validate_json(scenario), metadata, Track.of(points) if points else None)
 
 

@@ -50,7 +50,9 @@ class Recorder:
     def __enter__(self) -> Recorder:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         """Whatever happened, the file is whole."""
         self.close()
 
@@ -137,7 +139,9 @@ class Recorder:
         if channel is None:
             kind = type(message)
             schema = self._writer.register_schema(
-                f"trustr.{kind.__name__.removesuffix('Topic')}", "jsonschema", orjson.dumps(topics.schema(kind))
+                f"trustr.{kind.__name__.removesuffix('Topic')}",
+                "jsonschema",
+                orjson.dumps(topics.schema(kind)),
             )
             channel = self._topics[topic] = self._writer.register_channel(topic, "json", schema)
         self._writer.add_message(channel, time_ns, orjson.dumps(message, option=OPTIONS), time_ns)

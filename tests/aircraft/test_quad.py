@@ -28,9 +28,7 @@ def test_the_models_are_data_of_the_package():
 
 
 def test_the_readme_gives_every_parameter_its_value_and_a_source():
-    rows = re.findall(
-        r"^\| `([a-z0-9-]+)` \| ([^|]+) \| [^|]+ \| ([^|]+) \|$", (QUAD / "README.md").read_text(), re.M
-    )
+    rows = re.findall(r"^\| `([a-z0-9-]+)` \| ([^|]+) \| [^|]+ \| ([^|]+) \|$", (QUAD / "README.md").read_text(), re.M)
     assert {name: float(value) for name, value, _ in rows} == PARAMETERS
     assert all(source.strip() for *_, source in rows)
 
@@ -83,10 +81,6 @@ READERS = ("property", "input", "trigger", "kp", "ki", "rate_limit", "lag", "min
 @pytest.mark.parametrize("path", [QUAD / "quad.xml", *SYSTEMS], ids=lambda path: path.stem)
 def test_every_property_that_the_xml_reads_exists(path, properties):
     known = {line.split(" (")[0] for line in properties.splitlines()}
-    known |= {
-        node.get("name") for file in SYSTEMS for node in ET.parse(file).iter() if node.tag in COMPONENTS
-    }
-    read = {
-        node.text.strip().lstrip("-") for node in ET.parse(path).iter() if node.tag in READERS and node.text
-    }
+    known |= {node.get("name") for file in SYSTEMS for node in ET.parse(file).iter() if node.tag in COMPONENTS}
+    read = {node.text.strip().lstrip("-") for node in ET.parse(path).iter() if node.tag in READERS and node.text}
     assert {name for name in read if re.search("[a-z]/", name)} - known == set()

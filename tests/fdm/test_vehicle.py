@@ -25,10 +25,7 @@ ROTOR_INERTIA = 2.6e-5  # kg m²
 def gravity(place):
     """m/s²: Somigliana's WGS-84 formula (NGA.STND.0036) with the free-air term."""
     s2 = sin(radians(place.latitude_deg)) ** 2
-    return (
-        9.7803253359 * (1 + 0.00193185265241 * s2) / sqrt(1 - 0.00669437999013 * s2)
-        - 3.086e-6 * place.altitude_m
-    )
+    return 9.7803253359 * (1 + 0.00193185265241 * s2) / sqrt(1 - 0.00669437999013 * s2) - 3.086e-6 * place.altitude_m
 
 
 def density(altitude_m):
@@ -131,9 +128,7 @@ def test_a_hover_in_ten_metres_a_second_of_wind_does_not_drift():
 def test_a_velocity_step_is_quick_and_hardly_overshoots(axis):
     vehicle = flying()
     vehicle.set_velocity((2.0, 0.0, 0.0) if axis == 0 else (0.0, 2.0, 0.0), 0.0)
-    rise, overshoot = rise_and_overshoot(
-        response(vehicle, 250, 6, lambda v: v.position_velocity()[3 + axis]), 2.0
-    )
+    rise, overshoot = rise_and_overshoot(response(vehicle, 250, 6, lambda v: v.position_velocity()[3 + axis]), 2.0)
     assert 0.4 < rise < 0.8
     assert overshoot < 0.05
 
@@ -150,9 +145,7 @@ def test_a_climb_step_is_quick_and_hardly_overshoots(climb):
 def test_it_turns_a_quarter_in_about_a_second():
     vehicle = flying()
     vehicle.set_velocity((0.0, 0.0, 0.0), pi / 2)
-    rise, overshoot = rise_and_overshoot(
-        response(vehicle, 250, 5, lambda v: v.state().attitude_rpy[2]), pi / 2
-    )
+    rise, overshoot = rise_and_overshoot(response(vehicle, 250, 5, lambda v: v.state().attitude_rpy[2]), pi / 2)
     assert 0.7 < rise < 1.2
     assert overshoot < 0.05
 
@@ -236,12 +229,8 @@ def test_the_wrench_is_the_one_the_readme_describes():
         TORQUE * (t[0] + t[1] - t[2] - t[3]) - drag * 2 * ARM**2 * r,
     )
     assert abs(momentum * spin_q) > 1e-5, "the gyroscopic torque was not put to the test"
-    assert tuple(read(f"external_reactions/rotors/{axis}") for axis in "xyz") == pytest.approx(
-        force, rel=1e-6
-    )
-    assert tuple(read(f"external_reactions/torque/{axis}") for axis in "lmn") == pytest.approx(
-        torque, rel=1e-6
-    )
+    assert tuple(read(f"external_reactions/rotors/{axis}") for axis in "xyz") == pytest.approx(force, rel=1e-6)
+    assert tuple(read(f"external_reactions/torque/{axis}") for axis in "lmn") == pytest.approx(torque, rel=1e-6)
 
 
 def test_a_weak_rotor_turns_faster_and_the_vehicle_flies_on():
