@@ -19,7 +19,7 @@ from gcs.commands import (
     TakeOff,
 )
 from wire.frames import Sender
-from wire.payloads import PositionTarget, SET_POSITION_TARGET_LOCAL_NED, pack_position_target
+from wire.payloads import SET_POSITION_TARGET_LOCAL_NED, PositionTarget, pack_position_target
 
 GROUND_SYSTEM, GROUND_COMPONENT = 255, 190
 """Who we are on the wire."""

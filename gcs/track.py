@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,8 +31,12 @@ class Track:
     """True where positions are telemetry, because no simulation told the truth."""
 
     @staticmethod
-    def of(points: list[Point]) -> Track:
-        """A track of points in the order of time."""
+    def of(points: Sequence[Point], *, read_out_s: float) -> Track | None:
+        """A track of points in the order of time, as far as the first at the read-out; None of no points."""
+        before = sum(point.time_s < read_out_s - 1e-9 for point in points)
+        points = points[: before + 1]
+        if not points:
+            return None
         return Track(
             time_s=np.array([point.time_s for point in points]),
             position=np.array([point.position for point in points]),
@@ -67,13 +72,13 @@ class Tracker:
         """Keep this tick, if it belongs to the mission."""
         self._truth.read(tick.frames)
         point = point_of(tick, self._truth)
-        if point is not None and (not self._points or self._points[-1].time_s < self._read_out_s - 1e-9):
+        if point is not None:
             self._points.append(point)
 
     @property
     def track(self) -> Track | None:
         """All that was kept; None where the mission never began."""
-        return Track.of(self._points) if self._points else None
+        return Track.of(self._points, read_out_s=self._read_out_s)
 
 
 def point_of(tick: Tick, truth: Truth) -> Point | None:

@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import orjson
 from mcap.exceptions import McapError
-from mcap.reader import NonSeekingReader, make_reader
+from mcap.reader import NonSeekingReader, SeekingReader
 
 from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
+from gcs.mission import plan
 from gcs.recording.writer import METADATA, SCENARIO
 from gcs.track import Point, Track
 from scenarios import Scenario
@@ -49,7 +50,7 @@ def read(path: Path) -> Flown:
     """Scenario, metadata and mission of a recording. Raises UnreadableRecording."""
     try:
         with path.open("rb") as stream:
-            reader = make_reader(stream, record_size_limit=RECORD_SIZE_LIMIT)
+            reader = SeekingReader(stream, record_size_limit=RECORD_SIZE_LIMIT)
             scenario = next(a.data for a in reader.iter_attachments() if a.name == SCENARIO)
             metadata = next(m.metadata for m in reader.iter_metadata() if m.name == METADATA)
             points = list(_points(reader))
@@ -57,7 +58,8 @@ def read(path: Path) -> Flown:
         raise UnreadableRecording(
             f"{path}: not a readable recording of a flight: {error or type(error).__name__}"
         ) from None
-    return Flown(path, Scenario.model_validate_json(scenario), metadata, Track.of(points) if points else None)
+    loaded = Scenario.model_validate_json(scenario)
+    return Flown(path, loaded, metadata, Track.of(points, read_out_s=plan(loaded).read_out_s))
 
 
 def _points(reader: Any) -> Iterator[Point]:

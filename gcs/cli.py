@@ -1,0 +1,314 @@
+"""The `gcs` command: parse, build, call. What is heavy is imported by the command that needs it."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cyclopts import App, CycloptsError, Parameter
+
+if TYPE_CHECKING:
+    from gcs.summary import Summary
+    from scenarios import Scenario
+
+app = App(
+    name="gcs",
+    help="Ground station for swarms that know whom to trust.",
+    version="0.1.0",
+)
+
+FLOWN, BAD_INPUT, NOT_COMPLETED, INTERRUPTED = 0, 2, 3, 130
+"""Exit codes."""
+
+ScenarioName = Annotated[str, Parameter(help="A scenario's name (see `gcs scenarios`), or the path of a TOML file.")]
+Out = Annotated[Path | None, Parameter(help="Folder for run.mcap, summary.json and trajectory.png.")]
+AsJson = Annotated[bool, Parameter(name="--json", negative=(), help="One JSON object on stdout.")]
+Yes = Annotated[bool, Parameter(negative=(), help="Do not ask before arming.")]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Choices:
+    """What a flight is to be, besides its scenario."""
+
+    controller: Annotated[
+        Literal["average", "trust-r"] | None, Parameter(help="Update rule; the scenario's own, if absent.")
+    ] = None
+    trust: Annotated[Literal["truth", "ratings"] | None, Parameter(help="Where trust comes from.")] = None
+    severity: Annotated[
+        float | None, Parameter(help="Speed left to degraded motors, of cruise: the paper flies 0.4 and 0.7.")
+    ] = None
+    no_fault: Annotated[bool, Parameter(negative=(), help="Fly with everything healthy.")] = False
+    set_: Annotated[
+        tuple[str, ...],
+        Parameter(name="--set", negative=(), help="section.key=value; changes one key of the scenario. Repeatable."),
+    ] = ()
+
+    def scenario(self, name: str) -> Scenario:
+        """The scenario as chosen. Raises ScenarioError."""
+        from scenarios import ScenarioError, load
+
+        overrides = list(self.set_)
+        if self.controller is not None:
+            overrides.append(f'control.rule="{self.controller}"')
+        if self.trust is not None:
+            overrides.append(f'trust.source="{self.trust}"')
+        loaded = load(name, overrides=overrides)
+        if self.severity is not None and not 0 <= self.severity <= 1:
+            raise ScenarioError(f"--severity {self.severity}: must be 0 to 1, the fraction of cruise that is left")
+        if self.no_fault:
+            return loaded.without_faults()
+        return loaded if self.severity is None else loaded.with_severity(self.severity)
+
+
+@app.command
+def run(
+    scenario: ScenarioName,
+    /,
+    choices: Choices = Choices(),
+    *,
+    seed: Annotated[int, Parameter(help="Of noise, gusts and turbulence.")] = 1,
+    out: Out = None,
+    json: AsJson = False,
+) -> int:
+    """Fly a scenario in simulation, as fast as it goes, and record it."""
+
+    def command() -> int:
+        from fdm.world import World
+        from gcs.lockstep import Lockstep
+
+        chosen = choices.scenario(scenario)
+        world = Lockstep(World(chosen, seed=seed))
+        return _fly(scenario, chosen, world, world, seed=seed, out=out, json=json)
+
+    return _guarded(command)
+
+
+@app.command
+def fly(
+    scenario: ScenarioName,
+    /,
+    choices: Choices = Choices(),
+    *,
+    link: Annotated[
+        tuple[str, ...],
+        Parameter(
+            negative=(), help="udpin:HOST:PORT or udpout:HOST:PORT; repeatable, PORT may be a range 14550-14555."
+        ),
+    ],
+    arm: Annotated[bool, Parameter(negative=(), help="Arm and fly; without it, only listen.")] = False,
+    yes: Yes = False,
+    speed: Annotated[float, Parameter(help="The vehicles' seconds a second, as `fdm serve --speed`.")] = 1.0,
+    seed: Annotated[int | None, Parameter(help="Of `fdm serve`, for the record.")] = None,
+    out: Out = None,
+    json: AsJson = False,
+) -> int:
+    """Fly a scenario with vehicles behind real links: `fdm serve`, or PX4."""
+
+    def command() -> int:
+        from gcs.listen import listen
+        from gcs.live import Live
+        from wire.connection import parse
+
+        if speed <= 0:
+            raise BadUsageError(f"--speed {speed}: must be above 0")
+        chosen = choices.scenario(scenario)
+        connections = [connection for text in link for connection in parse(text)]
+        if arm and not _confirmed(yes):
+            return BAD_INPUT
+        live = Live(connections, range(1, chosen.swarm.count + 1), speed=speed)
+        try:
+            if not arm:
+                return listen(live, chosen, console=_stderr())
+            return _fly(scenario, chosen, live, live, seed=seed, out=out, json=json)
+        finally:
+            live.close()
+
+    return _guarded(command)
+
+
+@app.command
+def scenarios(*, json: AsJson = False) -> int:
+    """List the scenarios that ship."""
+    from gcs.listing import listing
+
+    return listing(as_json=json, console=_stdout())
+
+
+@app.command
+def reproduce(
+    *,
+    seeds: Annotated[int, Parameter(help="Flights a condition: seeds 1 to this.")] = 30,
+    jobs: Annotated[int, Parameter(help="Processes; −1 is one a core.")] = -1,
+    out: Annotated[Path | None, Parameter(help="Folder for reproduce.json and reproduce.md.")] = None,
+    json: AsJson = False,
+) -> int:
+    """Fly the paper's eight conditions over many seeds, and the recommended profile beside them."""
+
+    def command() -> int:
+        from gcs.reproduce import reproduce as fly_all
+        from gcs.session import output_folder
+
+        if seeds < 1:
+            raise BadUsageError(f"--seeds {seeds}: must be at least 1")
+        folder = output_folder(out, "reproduce")
+        result = fly_all(seeds=seeds, jobs=jobs, console=_stderr())
+        result.save(folder)
+        if json:
+            _write(result.json())
+        else:
+            result.show(_stdout())
+            _stderr().print(f"written: {folder}/reproduce.json, {folder}/reproduce.md", highlight=False, soft_wrap=True)
+        return FLOWN
+
+    return _guarded(command)
+
+
+@app.command
+def compare(
+    *recordings: Annotated[Path, Parameter(help="run.mcap files, or the folders they are in.")],
+    out: Annotated[Path, Parameter(help="The picture.")] = Path("comparison.png"),
+) -> int:
+    """Put flights side by side: a table, and one picture on one scale."""
+
+    def command() -> int:
+        from gcs.compare import compare as side_by_side
+
+        side_by_side(recordings, picture=out, console=_stdout())
+        return FLOWN
+
+    return _guarded(command)
+
+
+@app.command
+def replay(
+    recording: Path,
+    /,
+    *,
+    verify: Annotated[bool, Parameter(negative=(), help="Decide again and compare every set-point.")],
+) -> int:
+    """Decide a recorded flight again from its frames."""
+
+    def command() -> int:
+        from gcs.replay import verify as decide_again
+
+        if not verify:
+            raise BadUsageError("replay: for now only --verify")
+        return decide_again(recording, console=_stdout())
+
+    return _guarded(command)
+
+
+def _fly(
+    name: str, scenario: Scenario, link: Any, clock: Any, *, seed: int | None, out: Path | None, json: bool
+) -> int:
+    """The one way a flight is flown, whatever it is flown with."""
+    from contextlib import ExitStack
+
+    from gcs.operator import Operator
+    from gcs.progress import Display
+    from gcs.session import flown, output_folder
+
+    folder = output_folder(out, name)
+    console = _stderr()
+    with ExitStack() as stack:
+        operator = stack.enter_context(Operator(lambda words: console.print(words, highlight=False)))
+
+        def watching(flight: Any) -> tuple[Display]:
+            return (stack.enter_context(Display(flight, console, title=Path(name).stem)),)
+
+        summary = flown(name, scenario, link, clock, seed=seed, out=folder, operator=operator, watching=watching)
+    _report(summary, folder, json=json)
+    if operator.interrupted:
+        return INTERRUPTED
+    return FLOWN if summary.completed else NOT_COMPLETED
+
+
+def _report(summary: Summary, folder: Path, *, json: bool) -> None:
+    from gcs.session import PICTURE
+    from gcs.words import verdict
+
+    if summary.problem is not None:
+        _stderr().print(f"gcs: {summary.problem}", highlight=False, soft_wrap=True)
+    if json:
+        _write(summary.json())
+        return
+    console = _stdout()
+    console.print(verdict(summary), highlight=False)
+    console.print(f"recording  {summary.recording}", highlight=False, soft_wrap=True)
+    if (folder / PICTURE).exists():
+        console.print(f"picture    {(folder / PICTURE).resolve()}", highlight=False, soft_wrap=True)
+
+
+def _confirmed(yes: bool) -> bool:
+    """Arming moves rotors: a person types ARM, or a script says --yes."""
+    if yes:
+        return True
+    if not sys.stdin.isatty():
+        _stderr().print("gcs: --arm without a terminal needs --yes", highlight=False)
+        return False
+    if input("Rotors will turn. Type ARM to go on: ").strip() == "ARM":
+        return True
+    _stderr().print("gcs: not armed", highlight=False)
+    return False
+
+
+class BadUsageError(ValueError):
+    """An option that cannot be obeyed, in one sentence."""
+
+
+def _guarded(command: Callable[[], int]) -> int:
+    """Bad input is one sentence and exit code 2."""
+    try:
+        return command()
+    except Exception as error:
+        if not isinstance(error, _refusals()):
+            raise
+        _stderr().print(f"gcs: {error}", highlight=False, soft_wrap=True, markup=False)
+        return BAD_INPUT
+
+
+def _refusals() -> tuple[type[Exception], ...]:
+    """What speaks to a person; anything else is a defect and keeps its traceback."""
+    from gcs.recording.reader import UnreadableRecording
+    from gcs.recording.writer import RecordingError
+    from scenarios import ScenarioError
+    from wire.connection import ConnectionRefused
+
+    return BadUsageError, ScenarioError, ConnectionRefused, RecordingError, UnreadableRecording
+
+
+def _write(line: bytes) -> None:
+    sys.stdout.write(line.decode() + "\n")
+
+
+def _stdout() -> Any:
+    from rich.console import Console
+
+    return Console(width=None if sys.stdout.isatty() else 110)
+
+
+def _stderr() -> Any:
+    from rich.console import Console
+
+    return Console(stderr=True)
+
+
+def main() -> None:
+    """Entry point."""
+    try:
+        code = app(exit_on_error=False, print_error=False, result_action="return_value")
+    except CycloptsError as error:
+        sys.stderr.write(f"gcs: {error}\n")
+        code = BAD_INPUT
+    except KeyboardInterrupt:
+        sys.stderr.write("gcs: interrupted\n")
+        code = INTERRUPTED
+    except BrokenPipeError:  # the reader of our stdout has gone
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 1
+    sys.exit(code)

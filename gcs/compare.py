@@ -1,0 +1,60 @@
+"""Flights side by side, from their recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich import box
+from rich.table import Table
+
+from gcs.recording.reader import Flown, UnreadableRecording, read
+from gcs.scoring import score
+from gcs.session import RECORDING
+
+
+def compare(recordings: Sequence[Path], *, picture: Path, console: Any) -> None:
+    """Print a table and draw a picture. Raises UnreadableRecording, and OSError where the picture cannot be written."""
+    if not recordings:
+        raise UnreadableRecording("compare: name at least one recording, or the folder of a run")
+    flights = [read(path / RECORDING if path.is_dir() else path) for path in recordings]
+    console.print(_table(flights))
+    for flight in flights:
+        console.print(f"recording  {flight.path.resolve()}", highlight=False, soft_wrap=True)
+    _draw(flights, picture)
+    console.print(f"picture    {picture.resolve()}", highlight=False, soft_wrap=True)
+
+
+def _table(flights: Sequence[Flown]) -> Table:
+    from gcs.picture import controller_name
+
+    table = Table(title=flights[0].scenario.title, title_justify="left", title_style="bold", box=box.SIMPLE)
+    table.add_column("")
+    for flight in flights:
+        table.add_column(controller_name(flight.scenario), justify="right")
+    scores = [None if flight.track is None else score(flight.track, flight.scenario) for flight in flights]
+    expect = flights[0].scenario.expect
+    rows = (
+        (f"heading error, at most {expect.heading_error_deg:g}°", "heading_error_deg", "{:.1f}°"),
+        (f"distance to target, at most {expect.distance_to_target_m:g} m", "distance_to_target_m", "{:.1f} m"),
+        (f"closest two robots, at least {expect.min_separation_m:g} m", "min_separation_m", "{:.1f} m"),
+    )
+    for words, name, form in rows:
+        table.add_row(words, *("–" if s is None else form.format(getattr(s, name)) for s in scores))
+    verdicts = ("no score" if s is None else "[green]passed[/]" if s.passed else "[red]failed[/]" for s in scores)
+    table.add_row("mission", *verdicts)
+    return table
+
+
+def _draw(flights: Sequence[Flown], picture: Path) -> None:
+    from gcs.picture import Panel, controller_name, draw_side_by_side
+
+    panels = [
+        Panel(controller_name(flight.scenario), flight.track, flight.scenario)
+        for flight in flights
+        if flight.track is not None
+    ]
+    if not panels:
+        raise UnreadableRecording("compare: no recording has a mission to draw")
+    draw_side_by_side(panels, picture, heading=flights[0].scenario.title)

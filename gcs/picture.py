@@ -1,0 +1,203 @@
+"""The trajectory picture: where the swarm was sent, where each robot went, whom it trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.lines import Line2D
+
+from gcs.mission import Plan, plan
+from gcs.scoring import Score, healthy_robots, score
+from gcs.track import Track
+from scenarios import Scenario, offsets_ne
+
+HEALTHY = ("#1f4e8c", "#2a7fba", "#3aa6a0", "#5b8def", "#6a7fb5", "#2c9c6a")
+FAILED = "#d62728"
+PLANNED = "#555555"
+ABANDONED = "#b8b8b8"
+LABEL = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.75}
+DPI = 120
+PANEL_WIDTH, TRUST_HEIGHT = 5.8, 1.3
+"""Inches."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Panel:
+    """One flight of a picture."""
+
+    title: str
+    track: Track
+    scenario: Scenario
+
+
+def draw(track: Track, scenario: Scenario, path: Path) -> None:
+    """One flight, as trajectory.png."""
+    draw_side_by_side([Panel(controller_name(scenario), track, scenario)], path, heading=scenario.title)
+
+
+def draw_side_by_side(panels: Sequence[Panel], path: Path, *, heading: str) -> None:
+    """Several flights on one scale: paths above, trust below."""
+    window = _window(panels)
+    (west, east), (south, north) = window
+    map_height = min(max(PANEL_WIDTH * (north - south) / (east - west), 3.0), 8.0)
+    figure, axes = plt.subplots(
+        2,
+        len(panels),
+        figsize=(max(8.0, (PANEL_WIDTH + 0.7) * len(panels)), map_height + TRUST_HEIGHT + 2.4),
+        height_ratios=(map_height, TRUST_HEIGHT),
+        squeeze=False,
+        layout="constrained",
+    )
+    figure.suptitle(heading, fontsize=13, fontweight="bold")
+    for column, panel in enumerate(panels):
+        _map(axes[0, column], panel, window)
+        _trust(axes[1, column], panel, first=column == 0)
+    figure.legend(handles=_legend(panels), loc="outside lower center", ncols=4, frameon=False, fontsize=10)
+    figure.savefig(path, dpi=DPI)
+    plt.close(figure)
+
+
+def controller_name(scenario: Scenario) -> str:
+    """How a person calls this flight's controller."""
+    control = scenario.control
+    if control.rule == "average":
+        return "Averaged update (eq. 1)"
+    profile = "" if control.profile == "paper" else f", {control.profile} profile"
+    return f"Trust-R, trust from {scenario.trust.source}{profile}"
+
+
+Window = tuple[tuple[float, float], tuple[float, float]]
+"""(west, east), (south, north) [m]."""
+MARGIN = 6.5
+"""m round everything that is drawn."""
+
+
+def _window(panels: Sequence[Panel]) -> Window:
+    """What holds every path and target of all panels."""
+    places = [panel.track.position[..., :2].reshape(-1, 2) for panel in panels]
+    for panel in panels:
+        for segment in plan(panel.scenario).segments:
+            places += [segment.start_ne[None], segment.planned_end_ne[None]]
+    every = np.concatenate(places)
+    (south, west), (north, east) = every.min(axis=0) - MARGIN, every.max(axis=0) + MARGIN
+    return (west, east), (south, north)
+
+
+def _map(axes: Any, panel: Panel, window: Window) -> None:
+    track, scenario = panel.track, panel.scenario
+    path = plan(scenario)
+    result = score(track, scenario)
+    _draw_plan(axes, path)
+    healthy = healthy_robots(scenario)
+    for row, sound in enumerate(healthy):
+        north, east = track.position[:, row, 0], track.position[:, row, 1]
+        color = HEALTHY[row % len(HEALTHY)] if sound else FAILED
+        axes.plot(east, north, color=color, lw=1.3 if sound else 2.0, alpha=0.9, zorder=3)
+        axes.plot(east[0], north[0], ".", color=color, ms=5, zorder=3)
+        axes.plot(east[-1], north[-1], "o" if sound else "X", color=color, ms=6 if sound else 10, mec="white", zorder=5)
+        axes.annotate(
+            str(row + 1),
+            (east[-1], north[-1]),
+            xytext=(7, 3),
+            textcoords="offset points",
+            fontsize=9,
+            color=color,
+            fontweight="bold",
+            bbox=LABEL,
+            zorder=5,
+        )
+    mean = (track.position[:, healthy, :2] - offsets_ne(scenario)[healthy]).mean(axis=1)
+    axes.plot(mean[:, 1], mean[:, 0], color="black", lw=2.4, zorder=4)
+    axes.plot(mean[-1, 1], mean[-1, 0], "D", color="black", ms=5, mec="white", zorder=6)
+    axes.set_title(f"{panel.title}\n{_verdict(result, scenario)}", fontsize=11)
+    axes.set_xlim(window[0])
+    axes.set_ylim(window[1])
+    axes.set_aspect("equal")
+    axes.set_xlabel("east [m]")
+    axes.set_ylabel("north [m]")
+    axes.grid(color="#e6e6e6", lw=0.8)
+
+
+def _draw_plan(axes: Any, path: Plan) -> None:
+    """Planned legs, both targets, and the leg that an emergency cut short."""
+    for number, segment in enumerate(path.segments, start=1):
+        last = number == len(path.segments)
+        goal = segment.planned_end_ne
+        if not np.allclose(goal, segment.end_ne):
+            axes.plot(*_line(segment.end_ne, goal), color=ABANDONED, lw=1.6, ls=":", zorder=1)
+        axes.plot(*_line(segment.start_ne, segment.end_ne), color=PLANNED, lw=1.8, ls="--", zorder=2)
+        axes.plot(goal[1], goal[0], "*", color="#e8a200" if last else ABANDONED, ms=19, mec="#7a5500", zorder=6)
+        axes.annotate(
+            f"target {number}\n{segment.task}",
+            (goal[1], goal[0]),
+            xytext=(48, 14) if last else (0, 14),
+            textcoords="offset points",
+            ha="left" if last else "center",
+            fontsize=9,
+            bbox=LABEL,
+            arrowprops={"arrowstyle": "-", "color": "#7a5500", "lw": 0.8} if last else None,
+            zorder=7,
+        )
+
+
+def _line(start: Any, end: Any) -> tuple[list[float], list[float]]:
+    return [start[1], end[1]], [start[0], end[0]]
+
+
+def _verdict(result: Score | None, scenario: Scenario) -> str:
+    if result is None:
+        return "ended before its read-out"
+    passed = "passes" if result.passed else "FAILS"
+    return (
+        f"{passed}: heading off by {result.heading_error_deg:.1f}° (allowed {scenario.expect.heading_error_deg:g}°), "
+        f"{result.distance_to_target_m:.1f} m from target ({scenario.expect.distance_to_target_m:g} m)"
+    )
+
+
+def _trust(axes: Any, panel: Panel, *, first: bool) -> None:
+    track, scenario = panel.track, panel.scenario
+    healthy = healthy_robots(scenario)
+    path = plan(scenario)
+    if scenario.control.rule == "average":
+        axes.text(
+            0.97, 0.75, "the averaged update heeds everyone alike",
+            ha="right", va="center", transform=axes.transAxes, color=PLANNED,
+        )  # fmt: skip
+    else:
+        for row, sound in enumerate(healthy):
+            color = HEALTHY[row % len(HEALTHY)] if sound else FAILED
+            axes.plot(track.time_s, track.trust[:, row], color=color, lw=1.2 if sound else 2.2)
+    if path.hand_over_s > 0:
+        axes.axvline(path.hand_over_s, color=PLANNED, lw=1, ls="--")
+        axes.annotate(
+            "emergency call" if scenario.event else "hand-over",
+            (path.hand_over_s, 0.4),
+            xytext=(4, 0), textcoords="offset points", fontsize=9, color=PLANNED, va="center",
+        )  # fmt: skip
+    axes.set_xlim(0.0, path.read_out_s)
+    axes.set_ylim(-0.08, 1.08)
+    axes.set_xlabel("time since mission start [s]")
+    if first:
+        axes.set_ylabel("trust")
+    axes.grid(color="#e6e6e6", lw=0.8)
+
+
+def _legend(panels: Sequence[Panel]) -> list[Line2D]:
+    faulty = sorted({fault.vehicle for panel in panels for fault in panel.scenario.fault})
+    handles = [
+        Line2D([], [], color=PLANNED, ls="--", lw=1.8, label="planned path"),
+        Line2D([], [], color="black", lw=2.4, label="mean of the healthy robots"),
+        Line2D([], [], color=HEALTHY[1], marker="o", mec="white", label="healthy robots"),
+    ]
+    if faulty:
+        names = ", ".join(map(str, faulty))
+        handles.append(Line2D([], [], color=FAILED, marker="X", mec="white", ms=9, lw=2, label=f"failed robot {names}"))
+    return handles

@@ -1,0 +1,117 @@
+"""The flight on a terminal while it goes on: one line a vehicle, on stderr."""
+
+from __future__ import annotations
+
+import math
+import time
+from types import TracebackType
+
+from rich.console import Console, Group
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+from gcs.flight import Flight, Phase
+from gcs.loop import Tick
+from wire.modes import px4_mode_name
+
+REFRESH_S = 0.1
+"""Wall time between two pictures: a fast simulation is not slowed by its display."""
+MOST_ROWS = 24
+"""Vehicles with a line of their own."""
+
+
+class Display:
+    """A `Record` that shows. Where stderr is no terminal, it says each change of phase in a line."""
+
+    def __init__(self, flight: Flight, console: Console, *, title: str) -> None:
+        self._flight = flight
+        self._console = console
+        self._title = title
+        self._live = Live(console=console, transient=True, auto_refresh=False) if console.is_terminal else None
+        self._shown = -math.inf
+        self._phase: Phase | None = None
+
+    def __enter__(self) -> Display:
+        if self._live is not None:
+            self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+    def tick(self, tick: Tick) -> None:
+        """Show this turn of the loop, if it is time."""
+        phase = tick.diagnosis.phase
+        if self._live is None:
+            if phase is not self._phase:
+                self._console.print(f"{_clock(tick, self._flight)}  {phase.value}", highlight=False)
+        elif (now := time.monotonic()) - self._shown >= REFRESH_S or phase is not self._phase:
+            self._shown = now
+            self._live.update(self._screen(tick), refresh=True)
+        self._phase = phase
+
+    def _screen(self, tick: Tick) -> Group:
+        diagnosis = tick.diagnosis
+        head = Text.assemble(
+            (self._title, "bold"), f"   {_clock(tick, self._flight)}   ", (diagnosis.phase.value, "cyan")
+        )
+        if diagnosis.phase is Phase.MISSION:
+            head.append(f" · {diagnosis.task}")
+        flown = 0.0 if math.isnan(diagnosis.mission_s) else diagnosis.mission_s
+        bar = ProgressBar(total=self._flight.plan.read_out_s, completed=flown, width=72)
+        return Group(head, bar, self._table(tick))
+
+    def _table(self, tick: Tick) -> Table:
+        table = Table(box=None, padding=(0, 2), header_style="dim")
+        for column in ("UAV", "role", "mode"):
+            table.add_column(column)
+        for column in ("north", "east", "height", "speed", "battery", "link age", "trust"):
+            table.add_column(column, justify="right")
+        swarm, diagnosis = tick.swarm, tick.diagnosis
+        leaders = self._flight.scenario.swarm.leaders
+        for row, system in enumerate(swarm.ids[:MOST_ROWS]):
+            north, east = diagnosis.position_ne[row]
+            age_s = (tick.time_ns - int(swarm.position_ns[row])) / 1e9
+            heard = swarm.position_ns[row] > 0
+            table.add_row(
+                str(system),
+                "leader" if system in leaders else "follower",
+                _mode(bool(swarm.armed[row]), int(swarm.custom_mode[row])),
+                _number(north, "m"),
+                _number(east, "m"),
+                _number(-swarm.position_ned[row, 2], "m"),
+                _number(math.hypot(*swarm.velocity_ned[row, :2]), "m/s"),
+                "–" if math.isnan(swarm.battery[row]) else f"{swarm.battery[row]:.0%}",
+                Text(f"{age_s:.2f} s", style="red" if age_s > 0.3 else "")
+                if heard
+                else Text("not heard", style="yellow"),
+                _trust_bar(float(diagnosis.trust[row])),
+            )
+        if len(swarm.ids) > MOST_ROWS:
+            table.caption = f"and {len(swarm.ids) - MOST_ROWS} more"
+        return table
+
+
+def _clock(tick: Tick, flight: Flight) -> str:
+    mission_s = tick.diagnosis.mission_s
+    if math.isnan(mission_s):
+        return f"{tick.number * flight.scenario.time.period_s:6.1f} s after start"
+    return f"{mission_s:6.1f} of {flight.plan.read_out_s:.1f} s"
+
+
+def _mode(armed: bool, custom_mode: int) -> Text:
+    return Text(px4_mode_name(custom_mode)) if armed else Text("disarmed", style="dim")
+
+
+def _number(value: float, unit: str) -> str:
+    return "–" if math.isnan(value) else f"{value:.1f} {unit}"
+
+
+def _trust_bar(trust: float) -> Text:
+    style = "green" if trust >= 0.5 else "red"
+    return Text.assemble(("█" * round(trust * 8)).rjust(8, "·"), f" {trust:.2f}", style=style)

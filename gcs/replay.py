@@ -1,0 +1,94 @@
+"""A recorded flight as link and clock: the same loop decides it again, and what it sends is compared with what was sent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gcs.flight import Flight
+from gcs.loop import fly
+from gcs.recording.reader import RecordedTick, read, ticks
+from wire.frames import Frame
+from wire.payloads import SET_POSITION_TARGET_LOCAL_NED
+
+SETPOINT = SET_POSITION_TARGET_LOCAL_NED.to_bytes(3, "little")
+
+
+class Recorded:
+    """Frames and times of a recording; to wait is to turn a page. What is sent goes nowhere but into `sent`."""
+
+    def __init__(self, pages: list[RecordedTick]) -> None:
+        self._pages = pages
+        self._page = -1
+        self.sent: list[list[bytes]] = [[] for _ in pages]
+
+    def now(self) -> int:
+        """The recorded time of the current tick."""
+        return self._pages[max(self._page, 0)].time_ns
+
+    def sleep_until(self, _time_ns: int) -> None:
+        """On to the next tick."""
+        self._page += 1
+
+    def receive(self) -> list[Frame]:
+        """What the flight received at this tick."""
+        return self._pages[self._page].received
+
+    def send(self, _system: int, frame: bytes) -> None:
+        """Kept for comparison."""
+        self.sent[self._page].append(frame)
+
+    def events(self) -> tuple[str, ...]:
+        """What the operator asked for at this tick; at the end of a torn recording, to stop."""
+        return self._pages[self._page].events
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """The first tick at which the second decision is another."""
+
+    tick: int
+    recorded: list[bytes]
+    decided: list[bytes]
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """What deciding again came to."""
+
+    ticks: int
+    setpoints: int
+    difference: Difference | None
+
+
+def decide_again(path: Path) -> Verification:
+    """Decide a recording again, bit for bit. Raises UnreadableRecording."""
+    flight = Flight(read(path).scenario)
+    pages = list(ticks(path))
+    recorded = Recorded(pages)
+    fly(recorded, recorded, flight, (), period_ns=flight.scenario.time.period_ns, events=recorded.events)
+    difference = next(
+        (
+            Difference(tick, page.sent, sent)
+            for tick, (page, sent) in enumerate(zip(pages, recorded.sent, strict=True))
+            if page.sent != sent
+        ),
+        None,
+    )
+    setpoints = sum(frame[7:10] == SETPOINT for page in pages for frame in page.sent)
+    return Verification(len(pages), setpoints, difference)
+
+
+def verify(path: Path, *, console: Any) -> int:
+    """Say what deciding again came to; 0 where nothing differs, else 3."""
+    result = decide_again(path)
+    if result.difference is None:
+        console.print(
+            f"{result.ticks} ticks decided again: all {result.setpoints} set-points, and every other frame sent, "
+            "identical to the bit",
+            highlight=False,
+        )
+        return 0
+    console.print(f"the decision differs from tick {result.difference.tick} on", highlight=False)
+    return 3

@@ -1,0 +1,136 @@
+"""One flight from scenario to summary: loop, recording, score, picture. Link and clock come from outside."""
+
+from __future__ import annotations
+
+import datetime
+import platform
+import time
+from collections.abc import Callable, Iterable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from gcs.flight import Flight, FlightState
+from gcs.loop import Clock, Link, Record, fly
+from gcs.operator import Operator
+from gcs.recording.writer import Recorder, RecordingError, Tap
+from gcs.scoring import Score, score
+from gcs.summary import Summary, collision, severity_of, trust_of
+from gcs.track import Tracker
+from scenarios import Scenario
+
+RECORDING = "run.mcap"
+PICTURE = "trajectory.png"
+
+
+def flown(
+    name: str,
+    scenario: Scenario,
+    link: Link,
+    clock: Clock,
+    *,
+    seed: int | None,
+    out: Path,
+    operator: Operator,
+    watching: Callable[[Flight], Iterable[Record]],
+) -> Summary:
+    """Fly a scenario over a link; leaves run.mcap, summary.json and trajectory.png in `out`.
+
+    name: how the summary calls the scenario;  watching: builds what shows the flight while it goes on.
+    Raises RecordingError before take-off where `out` cannot be written.
+    """
+    flight = Flight(scenario)
+    tracker = Tracker(flight)
+    began = time.perf_counter()
+    start_ns = clock.now()
+    with Recorder(out / RECORDING, scenario, start_ns=start_ns, metadata=_metadata(name, seed)) as recorder:
+        state = fly(
+            Tap(link, clock, recorder),
+            clock,
+            flight,
+            (tracker, recorder, *watching(flight)),
+            period_ns=scenario.time.period_ns,
+            events=operator.events,
+        )
+        result = None if tracker.track is None else score(tracker.track, scenario)
+        took_s = time.perf_counter() - began
+        summary = _summary(name, scenario, state, result, seed, took_s, (out / RECORDING).resolve())
+        summary = _with(summary, scored_on="telemetry" if tracker.track and tracker.track.measured else "truth")
+        recorder.add_metadata("summary", {"json": summary.json().decode()})
+    summary.save(out)
+    if tracker.track is not None:
+        from gcs.picture import draw
+
+        draw(tracker.track, scenario, out / PICTURE)
+    return summary
+
+
+def output_folder(out: Path | None, name: str) -> Path:
+    """Where a run writes, made and tried. Raises RecordingError."""
+    now = datetime.datetime.now(datetime.UTC).strftime("%Y%m%dT%H%M%S")
+    folder = Path("runs") / f"{now}-{Path(name).stem}" if out is None else out
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".writable"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise RecordingError(f"--out {folder}: cannot be written: {error.strerror or error}") from None
+    return folder
+
+
+def _metadata(name: str, seed: int | None) -> dict[str, str]:
+    """Versions, seed and wall time: outside the promise of same seed, same bytes."""
+    packages = ("trustr", "jsbsim", "pymavlink", "numpy", "mcap")
+    return {
+        "scenario": name,
+        "seed": "" if seed is None else str(seed),
+        "started": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "python": platform.python_version(),
+        **{package: _version(package) for package in packages},
+    }
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except ImportError:
+        return "absent"
+
+
+def _summary(
+    name: str,
+    scenario: Scenario,
+    state: FlightState,
+    result: Score | None,
+    seed: int | None,
+    took_s: float,
+    recording: Path,
+) -> Summary:
+    simulated_s = state.tick * scenario.time.period_s
+    problem = state.problem or collision(result)
+    return Summary(
+        scenario=name,
+        controller=scenario.control.rule,
+        trust=trust_of(scenario),
+        severity=severity_of(scenario),
+        seed=seed,
+        heading_error_deg=result and result.heading_error_deg,
+        distance_to_target_m=result and result.distance_to_target_m,
+        min_separation_m=result and result.min_separation_m,
+        passed=bool(result and result.passed and problem is None),
+        detected={} if result is None else {str(k): v for k, v in result.detected.items()},
+        false_alarms=0 if result is None else result.false_alarms,
+        simulated_s=round(simulated_s, 6),
+        real_time_factor=round(simulated_s / took_s, 2),
+        recording=str(recording),
+        profile=scenario.control.profile,
+        scored_on="truth",
+        problem=problem,
+    )
+
+
+def _with(summary: Summary, **changes: Any) -> Summary:
+    from dataclasses import replace
+
+    return replace(summary, **changes)

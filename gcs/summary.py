@@ -1,0 +1,71 @@
+"""What a run reports: one object, on stdout with --json and in summary.json."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import orjson
+
+from gcs.scoring import CONTACT, Score
+from scenarios import MotorDegradation, Scenario
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """One flight in figures; null where it did not get so far."""
+
+    scenario: str
+    controller: str
+    trust: str | None
+    """Where trust came from; null for rules that use none."""
+    severity: float | None
+    """max_speed_fraction of the degraded motor; null without one."""
+    seed: int | None
+    """null where nothing was simulated by us."""
+    heading_error_deg: float | None
+    distance_to_target_m: float | None
+    min_separation_m: float | None
+    passed: bool
+    detected: dict[str, float]
+    """System id → seconds from the fault's onset until its trust fell below 0.5."""
+    false_alarms: int
+    simulated_s: float
+    real_time_factor: float
+    recording: str
+    """Absolute path."""
+    profile: str
+    scored_on: str
+    """"truth", or "telemetry" where no simulation told it."""
+    problem: str | None
+    """Why the flight could not be completed."""
+
+    @property
+    def completed(self) -> bool:
+        """Whether the flight was flown to its end, well or badly."""
+        return self.problem is None
+
+    def json(self) -> bytes:
+        """As one line of JSON."""
+        return orjson.dumps(asdict(self))
+
+    def save(self, folder: Path) -> None:
+        """Write summary.json."""
+        (folder / "summary.json").write_bytes(orjson.dumps(asdict(self), option=orjson.OPT_INDENT_2) + b"\n")
+
+
+def severity_of(scenario: Scenario) -> float | None:
+    """How much is left to the first degraded motor."""
+    return next((f.max_speed_fraction for f in scenario.fault if isinstance(f, MotorDegradation)), None)
+
+
+def trust_of(scenario: Scenario) -> str | None:
+    """Where trust comes from, if the rule uses it."""
+    return None if scenario.control.rule == "average" else scenario.trust.source
+
+
+def collision(score: Score | None) -> str | None:
+    """The sentence for two vehicles that touched."""
+    if score is None or score.min_separation_m >= CONTACT:
+        return None
+    return f"two vehicles came within {score.min_separation_m:.2f} m of each other: their rotors would have touched"
