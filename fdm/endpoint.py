@@ -143,7 +143,7 @@ class Endpoint:
             if key == GUIDANCE:
                 self._surroundings.renew(self.vehicle, now.time_s)
                 self._take(modes.advance(self._pilot, now, self._failsafe), now)
-                self._fly(now)
+                self._fly(now, dt=PERIOD_S)
             elif key == TRUTH:
                 self._send(self._reporter.truth())
             else:
@@ -165,13 +165,13 @@ class Endpoint:
             self._send(self._reporter.word(severity, text))
         return ACCEPTED if outcome.accepted else REJECTED
 
-    def _fly(self, now: Situation) -> None:
-        """Hand the mode's velocity to the flight controller, through whatever is wrong with it."""
+    def _fly(self, now: Situation, *, dt: float) -> None:
+        """Hand the mode's velocity to the flight controller, through whatever is wrong with it; dt: s of yaw rate."""
         pilot = self._pilot
         velocity = modes.command(pilot, now)
         if pilot.mode is Mode.OFFBOARD:
             velocity = self._surroundings.flown(velocity, now.time_s)
-        yaw = modes.heading(pilot, PERIOD_S)
+        yaw = modes.heading(pilot, dt)
         if yaw != pilot.yaw:
             self._pilot = replace(pilot, yaw=yaw)
         self.vehicle.set_velocity(velocity, yaw)
@@ -188,7 +188,7 @@ class Endpoint:
             self.first_motion_step = self.vehicle.steps
         self._pilot = modes.hear(self._pilot, setpoint)
         if self._pilot.mode is Mode.OFFBOARD:
-            self._fly(self._situation())
+            self._fly(self._situation(), dt=0.0)
 
     def _setpoint(self, target: PositionTarget) -> Setpoint | None:
         """The velocity set-point in a message; None where it is none that we fly."""
