@@ -223,10 +223,12 @@ def _watch_the_ground(pilot: Pilot, now: Situation) -> Pilot:
 
 
 def _anchored(pilot: Pilot, now: Situation) -> Pilot:
-    """Take the place to stay at, once slow enough."""
-    if pilot.mode in (Mode.HOLD, Mode.LAND) and pilot.anchor_ned is None and math.hypot(*now.velocity_ned) < STOPPED:
-        return replace(pilot, anchor_ned=now.position_ned)
-    return pilot
+    """Take the place to stay at, once slow enough; coming down does not count against LAND."""
+    if pilot.mode not in (Mode.HOLD, Mode.LAND) or pilot.anchor_ned is not None:
+        return pilot
+    north, east, down = now.velocity_ned
+    speed = math.hypot(north, east, 0.0 if pilot.mode is Mode.LAND else down)
+    return replace(pilot, anchor_ned=now.position_ned) if speed < STOPPED else pilot
 
 
 def _towards(anchor_ned: Vector, now: Situation) -> Vector:
