@@ -156,7 +156,7 @@ def set_mode(pilot: Pilot, now: Situation, mode: Mode, failsafe: Failsafe) -> Ou
     if mode is Mode.OFFBOARD and not _hears_setpoints(pilot, now, failsafe):
         return _refuse(pilot, "Offboard denied: no set-points are coming")
     if mode is pilot.mode:
-        return Outcome(pilot)
+        return Outcome(replace(pilot, land_at_s=None))
     return Outcome(replace(pilot, mode=mode, anchor_ned=None, land_at_s=None))
 
 
