@@ -97,7 +97,7 @@ class Reporter:
 
     def message_interval(self, message: int, interval_s: float) -> bytes:
         """MESSAGE_INTERVAL: what a stream's rate is; 0 s is off."""
-        interval_us = round(interval_s * 1e6) if interval_s else -1
+        interval_us = min(round(interval_s * 1e6), 2**31 - 1) if interval_s else -1
         return self._autopilot.pack(dialect.MAVLink_message_interval_message(message, interval_us))
 
     def _heartbeat(self, pilot: Pilot, _now: Situation, _measured: tuple[float, ...]) -> bytes:
