@@ -28,6 +28,9 @@ VELOCITY_MASKS = frozenset({0x0DC7, 0x09C7, 0x05C7, 0x0FC7})
 IGNORE_YAW, IGNORE_YAW_RATE = 0x0400, 0x0800
 LOCAL_NED, BODY_NED = dialect.MAV_FRAME_LOCAL_NED, dialect.MAV_FRAME_BODY_NED
 
+MEASUREMENTS = (dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED, dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)
+"""Messages that report one measurement where they are due together."""
+
 FORCE_DISARM = 21196
 """param2 of MAV_CMD_COMPONENT_ARM_DISARM that disarms in the air."""
 STANDS_STILL = 1e-9
@@ -73,6 +76,7 @@ class Endpoint:
             self._schedule.set_interval(message, 1.0 / rate_hz, step=0)
         self._pilot = Pilot()
         self._measured: tuple[float, ...] = vehicle.position_velocity()
+        self._measured_step = 0
         self._commands: dict[int, Callable[[Any], int]] = {
             dialect.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
             dialect.MAV_CMD_NAV_TAKEOFF: self._take_off,
@@ -150,8 +154,9 @@ class Endpoint:
                 self._report(key, now)
 
     def _report(self, message: int, now: Situation) -> None:
-        if message == dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED:
+        if message in MEASUREMENTS and self._measured_step != self.vehicle.steps:
             self._measured = self._surroundings.measured((*now.position_ned, *now.velocity_ned), now.time_s)
+            self._measured_step = self.vehicle.steps
         self._send(self._reporter.report(message, self._pilot, now, self._measured))
 
     def _take(self, outcome: Outcome, now: Situation) -> int:
