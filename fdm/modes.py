@@ -26,6 +26,8 @@ LANDING_SPEED = 0.7  # m/s, MPC_LAND_SPEED: landing, near the ground
 SLOW_BELOW = 3.0  # m above the take-off place
 HOLD_GAIN = 0.95  # 1/s, MPC_XY_P
 HOLD_SPEED = 3.0  # m/s, the most that holding a position may ask for
+OFFBOARD_SPEED = 12.0  # m/s, MPC_XY_VEL_MAX: the most that a set-point may ask for
+OFFBOARD_CLIMB, OFFBOARD_DESCENT = 3.0, 1.5  # m/s, MPC_Z_VEL_MAX_UP, MPC_Z_VEL_MAX_DN
 STOPPED = 0.3  # m/s: below it, the place to hold is taken
 REACHED = 0.2  # m: take-off is over
 DEFAULT_TAKEOFF_HEIGHT = 2.5  # m, MIS_TAKEOFF_ALT
@@ -192,7 +194,7 @@ def command(pilot: Pilot, now: Situation) -> Vector:
     if now.on_ground and pilot.mode is not Mode.TAKEOFF:
         return 0.0, 0.0, PRESS_DOWN
     if pilot.mode is Mode.OFFBOARD and pilot.setpoint is not None:
-        return pilot.setpoint.velocity_ned
+        return _flyable(pilot.setpoint.velocity_ned)
     north, east, down = (0.0, 0.0, 0.0) if pilot.anchor_ned is None else _towards(pilot.anchor_ned, now)
     if pilot.mode is Mode.TAKEOFF:
         down = max(down, -TAKEOFF_SPEED)
@@ -229,6 +231,13 @@ def _anchored(pilot: Pilot, now: Situation) -> Pilot:
     north, east, down = now.velocity_ned
     speed = math.hypot(north, east, 0.0 if pilot.mode is Mode.LAND else down)
     return replace(pilot, anchor_ned=now.position_ned) if speed < STOPPED else pilot
+
+
+def _flyable(velocity_ned: Vector) -> Vector:
+    """What a set-point may ask for: a huge one would wind the controller up for half a minute."""
+    north, east, down = velocity_ned
+    slower = min(1.0, OFFBOARD_SPEED / max(math.hypot(north, east), 1e-9))
+    return north * slower, east * slower, max(-OFFBOARD_CLIMB, min(OFFBOARD_DESCENT, down))
 
 
 def _towards(anchor_ned: Vector, now: Situation) -> Vector:
