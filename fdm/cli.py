@@ -70,9 +70,7 @@ def serve(
         server.turn()
         if server.behind_s > 1.0 and not warned:
             warned = True
-            _say(
-                f"this machine is too slow for --speed {speed:g}: the simulation lags {server.behind_s:.1f} s and counting"
-            )
+            _say(f"this machine is too slow for --speed {speed:g}: the simulation lags {server.behind_s:.1f} s")
     server.close()
     _say("stopped")
     return 0

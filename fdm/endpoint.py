@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, Final
 
 from pymavlink.dialects.v20 import common as dialect
 
@@ -24,7 +24,7 @@ GUIDANCE, TRUTH = -2, -1
 TRUTH_PERIOD_S = 0.1
 
 VELOCITY_MASKS = frozenset({0x0DC7, 0x09C7, 0x05C7, 0x0FC7})
-"""type_mask of a velocity set-point: alone, with yaw, with yaw rate, and alone as MAVProxy writes it (force bit set)."""
+"""type_mask of a velocity set-point: alone, with yaw, with yaw rate, alone as MAVProxy writes it (force bit)."""
 IGNORE_YAW, IGNORE_YAW_RATE = 0x0400, 0x0800
 LOCAL_NED, BODY_NED = dialect.MAV_FRAME_LOCAL_NED, dialect.MAV_FRAME_BODY_NED
 
@@ -36,10 +36,10 @@ FORCE_DISARM = 21196
 STANDS_STILL = 1e-9
 """m/s: a horizontal set-point above it asks the vehicle to move."""
 
-ACCEPTED = dialect.MAV_RESULT_ACCEPTED
-REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
-DENIED = dialect.MAV_RESULT_DENIED
-UNSUPPORTED = dialect.MAV_RESULT_UNSUPPORTED
+ACCEPTED: Final[int] = dialect.MAV_RESULT_ACCEPTED
+REJECTED: Final[int] = dialect.MAV_RESULT_TEMPORARILY_REJECTED
+DENIED: Final[int] = dialect.MAV_RESULT_DENIED
+UNSUPPORTED: Final[int] = dialect.MAV_RESULT_UNSUPPORTED
 
 
 class Endpoint:

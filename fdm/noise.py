@@ -1,4 +1,4 @@
-"""Seeded randomness of one vehicle: measurement noise and gusts. Every stream is drawn in order, counted from mission start.
+"""Seeded randomness of one vehicle: measurement noise and gusts, each stream drawn in order from mission start.
 
 A stream is named by (seed, vehicle, purpose), so that adding a vehicle or a purpose changes no other stream.
 """

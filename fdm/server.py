@@ -19,8 +19,8 @@ CATCH_UP_S = 0.25
 class Server:
     """Vehicles speak to one address each, or all to one; whoever answers from there is listened to.
 
-    shared: all vehicles send from one socket to the connection's port. separate: vehicle i sends from a socket of its own
-    to that port + i − 1.
+    shared: all vehicles send from one socket to the connection's port. separate: vehicle i sends from a socket of its
+    own to that port + i − 1.
     """
 
     def __init__(self, world: World, to: Connection, *, ports: Literal["shared", "separate"], speed: float) -> None:

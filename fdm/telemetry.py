@@ -1,4 +1,4 @@
-"""What a simulated vehicle says: its state as MAVLink frames of the autopilot (component 1) and of the truth (component 200)."""
+"""What a simulated vehicle says: MAVLink frames of its autopilot (component 1) and of the truth (component 200)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Where trust comes from: functions of the time since mission start that return one trust a robot.
 
-`truth` is the simulation's own knowledge of the faults, `ratings` the user study's mean ratings. Before the mission every
-robot is trusted.
+`truth` is the simulation's own knowledge of the faults, `ratings` the user study's mean ratings. Before the mission
+every robot is trusted.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def _truth(scenario: Scenario) -> TrustSource:
 
 
 def _ratings(scenario: Scenario) -> TrustSource:
-    """The study's means: one for robots that fail at any time in the flight, one for the others, all the flight long."""
+    """The study's means, all the flight long: one for robots that fail at any time in it, one for the others."""
     faulty = np.zeros(scenario.swarm.count, bool)
     for fault in scenario.fault:
         faulty[fault.vehicle - 1] = True

@@ -78,11 +78,10 @@ def run(
     """Fly a scenario in simulation, as fast as it goes, and record it."""
 
     def command() -> int:
-        from fdm.world import World
         from gcs.lockstep import Lockstep
 
         chosen = choices.scenario(scenario)
-        world = Lockstep(World(chosen, seed=seed))
+        world = Lockstep.of(chosen, seed=seed)
         return _fly(scenario, chosen, world, world, seed=seed, out=out, json=json)
 
     return _guarded(command)

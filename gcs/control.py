@@ -8,7 +8,7 @@ from scenarios import Scenario, offsets_ne
 from trustr.controller import Settings
 
 REFERENCE_RESPONSE_S = 0.25
-"""The velocity response for which c1, c2 and the cap were found; `recommended` scales them by the fleet's against it."""
+"""Response for which c1, c2 and the cap were found; `recommended` scales them by the fleet's own against it."""
 FORMATION_GAIN = 0.3
 """1/s: how fast `recommended` lets robots return to their place among those they trust."""
 

@@ -216,7 +216,7 @@ class Flight:
         return state, ask + commands, diagnosis
 
     def _run_up(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
-        """Bring the formation to cruise, so that time 0 finds it where the first leg begins, each robot in its place."""
+        """Bring the formation to cruise: time 0 finds it where the first leg begins, each robot in its place."""
         into = state.tick - state.phase_tick
         if into >= self._run_up_ticks:
             state = replace(_enter(state, Phase.MISSION), mission_tick=state.tick)
@@ -320,19 +320,16 @@ class Flight:
     def _note_the_lost(
         self, state: FlightState, swarm: Swarm, obeying: npt.NDArray[np.bool_], now_ns: int
     ) -> FlightState:
-        """The first vehicle to fall silent, or to leave our mode, is why the flight is not complete; the others fly on."""
+        """The first vehicle to fall silent, or to leave our mode, leaves the flight incomplete; the others fly on."""
         if state.problem is not None:
             return state
         silent = ~swarm.fresh(now_ns, within_ns=LOST_NS)
+        when = f"{self._mission_s(state):.1f} s into the mission"
         for row, system in enumerate(swarm.ids):
             if silent[row]:
-                return replace(
-                    state,
-                    problem=f"vehicle {system} fell silent {self._mission_s(state):.1f} s into the mission",
-                )
+                return replace(state, problem=f"vehicle {system} fell silent {when}")
             if not obeying[row]:
-                words = f"vehicle {system} left the ground station's control {self._mission_s(state):.1f} s into the mission"
-                return replace(state, problem=words)
+                return replace(state, problem=f"vehicle {system} left the ground station's control {when}")
         return state
 
     def _mission_s(self, state: FlightState) -> float:

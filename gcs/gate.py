@@ -27,15 +27,15 @@ def admit(asked_ned: Array, before_ned: Array, limits: Limits, *, dt: float) -> 
     """What is sent of what was asked, (N, 3) m/s, and a verdict for each vehicle, (N,).
 
     before_ned: (N, 3) m/s, the set-points sent last;  dt: s between the two.
-    A set-point that is not finite becomes zero velocity. Speed is clamped before acceleration, and a clamped acceleration
-    lies between two allowed velocities, so both bounds hold at once.
+    A set-point that is not finite becomes zero velocity. Speed is clamped before acceleration, and a clamped
+    acceleration ends between two allowed velocities, so both bounds hold at once.
     """
-    finite = np.isfinite(asked_ned).all(axis=1)
+    finite: npt.NDArray[np.bool_] = np.isfinite(asked_ned).all(axis=1)
     wanted = np.where(finite[:, None], asked_ned, 0.0)
     wanted = _shorten(wanted, limits.speed)
     change = wanted - before_ned
     sent = before_ned + _shorten(change, limits.acceleration * dt)
-    slowed = (np.abs(sent - asked_ned) > 1e-9).any(axis=1)
+    slowed = np.abs(sent - asked_ned).max(axis=1) > 1e-9
     verdict = np.where(finite, np.where(slowed, SLOWED, PASSED), REFUSED).astype(np.int8)
     return sent, verdict
 

@@ -13,7 +13,7 @@ from scenarios import find, load, names
 
 def listing(*, as_json: bool, console: Any) -> int:
     """Print name, title and plan of each."""
-    rows = []
+    rows: list[dict[str, Any]] = []
     for name in names():
         scenario = load(name)
         rows.append(

@@ -58,7 +58,8 @@ class Live:
         if route is not None:
             taken = route[0].send(frame, route[1])
         else:
-            taken = any([port.send(frame) for port in self._ports if port.connection.kind == "udpout"])
+            speak_first = [port for port in self._ports if port.connection.kind == "udpout"]
+            taken = sum(port.send(frame) for port in speak_first) > 0
         self.unsent += not taken
 
     def close(self) -> None:

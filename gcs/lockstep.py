@@ -1,8 +1,12 @@
-"""A simulated world as link and clock at once: to wait is to let its physics step. Runs as fast as JSBSim, the same every time."""
+"""A simulated world as link and clock at once: to wait is to let its physics step.
+
+Runs as fast as JSBSim does, and the same every time. The only module of the ground station that knows `fdm`.
+"""
 
 from __future__ import annotations
 
 from fdm.world import World
+from scenarios import Scenario
 from wire.frames import Frame, Framer
 
 EPOCH_NS = 1_577_836_800_000_000_000
@@ -16,6 +20,11 @@ class Lockstep:
         self._world = world
         self._hz = world.physics_hz
         self._framer = Framer()
+
+    @staticmethod
+    def of(scenario: Scenario, *, seed: int) -> Lockstep:
+        """The vehicles of a scenario, on their pads."""
+        return Lockstep(World(scenario, seed=seed))
 
     def now(self) -> int:
         """ns since 1970, from the step count."""

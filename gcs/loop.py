@@ -1,4 +1,4 @@
-"""The one loop. Simulation, real vehicles and replay differ in the link and the clock they hand to it, and in nothing else."""
+"""The one loop: simulation, real vehicles and replay differ in the link and the clock they hand to it, no more."""
 
 from __future__ import annotations
 

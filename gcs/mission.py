@@ -108,7 +108,7 @@ def plan(scenario: Scenario) -> Plan:
 
 
 def run_up(cruise: float, duration_s: float, time_s: float) -> tuple[float, float]:
-    """(distance [m], speed [m/s]) along the first leg, `time_s` into the run-up: half of it faster and faster, half at cruise."""
+    """(distance [m], speed [m/s]) along the first leg, `time_s` into the run-up: half speeding up, half at cruise."""
     half = 0.5 * duration_s
     if time_s >= half:
         return cruise * (0.5 * half + time_s - half), cruise
@@ -150,7 +150,7 @@ def _turn_s(before: Segment, after: Segment | None) -> float:
 
 
 def _swinging(before: Segment, after: Segment, since: float) -> VirtualLeader:
-    """From the old velocity onto the new leg: a cubic offset that begins with the difference of velocities, and ends at rest."""
+    """From the old velocity onto the new leg: a cubic offset whose rate begins as their difference and ends at zero."""
     span = min(SWING_S, after.ends_s - after.begins_s)
     part = since / span
     difference = before.velocity_ne - after.velocity_ne

@@ -1,4 +1,4 @@
-"""A recorded flight as link and clock: the same loop decides it again, and what it sends is compared with what was sent."""
+"""A recorded flight as link and clock: the same loop decides it again, and what it sends is compared."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The paper's Table II over many seeds: its eight conditions, the fault-free rows, and the recommended profile beside them."""
+"""The paper's Table II over many seeds: its eight conditions, fault-free rows, and the recommended profile."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from rich import box
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from fdm.world import World
 from gcs.flight import Flight
 from gcs.lockstep import Lockstep
 from gcs.loop import fly
@@ -31,7 +30,7 @@ PAPER = {
     ("emergency", "average"): (19.0, 9.8),
     ("emergency", "trust-r"): (4.0, 3.2),
 }
-"""Table II: absolute heading error [degrees] and distance to target [m], faulty and repaired; one row for both severities."""
+"""Table II: absolute heading error [degrees] and distance to target [m]; one row for both severities."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +159,7 @@ def one_flight(condition: Condition, seed: int) -> Score:
     scenario = condition.build()
     flight = Flight(scenario)
     tracker = Tracker(flight)
-    world = Lockstep(World(scenario, seed=seed))
+    world = Lockstep.of(scenario, seed=seed)
     state = fly(world, world, flight, (tracker,), period_ns=scenario.time.period_ns)
     result = None if tracker.track is None else score(tracker.track, scenario)
     if result is None or state.problem is not None:

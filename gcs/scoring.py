@@ -84,7 +84,7 @@ def heading_error(start_ne: Array, end_ne: Array, wanted_ne: Array) -> float:
 
 
 def min_separation(position: Array) -> float:
-    """Smallest 3-D distance [m] of any two airborne robots over (T, N, 3) positions; infinite where none fly together."""
+    """Smallest 3-D distance [m] of any two airborne robots over (T, N, 3) positions; infinite where there are none."""
     grounded = position[..., 2] < AIRBORNE
     closest = math.inf
     for first in range(position.shape[1] - 1):

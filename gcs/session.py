@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import datetime
+import datetime as dt
 import platform
 import time
 from collections.abc import Callable, Iterable
@@ -67,7 +67,7 @@ def flown(
 
 def output_folder(out: Path | None, name: str) -> Path:
     """Where a run writes, made and tried. Raises RecordingError."""
-    now = datetime.datetime.now(datetime.UTC).strftime("%Y%m%dT%H%M%S")
+    now = dt.datetime.now(dt.UTC).strftime("%Y%m%dT%H%M%S")
     folder = Path("runs") / f"{now}-{Path(name).stem}" if out is None else out
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -85,7 +85,7 @@ def _metadata(name: str, seed: int | None) -> dict[str, str]:
     return {
         "scenario": name,
         "seed": "" if seed is None else str(seed),
-        "started": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "started": dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
         "python": platform.python_version(),
         **{package: _version(package) for package in packages},
     }
@@ -115,9 +115,9 @@ def _summary(
         trust=trust_of(scenario),
         severity=severity_of(scenario),
         seed=seed,
-        heading_error_deg=result and result.heading_error_deg,
-        distance_to_target_m=result and result.distance_to_target_m,
-        min_separation_m=result and result.min_separation_m,
+        heading_error_deg=None if result is None else result.heading_error_deg,
+        distance_to_target_m=None if result is None else result.distance_to_target_m,
+        min_separation_m=None if result is None else result.min_separation_m,
         passed=bool(result and result.passed and problem is None),
         detected={} if result is None else {str(k): v for k, v in result.detected.items()},
         false_alarms=0 if result is None else result.false_alarms,

@@ -36,8 +36,8 @@ class SwarmFrame:
 def swarm_frame(origin: Array, position_ne: Array, offset_ne: Array, run_up_ne: Array) -> SwarmFrame:
     """The frame of a fleet about to take off.
 
-    origin: (N, 3) of each vehicle's own origin, latitude, longitude [degrees], altitude [m];  position_ne: (N, 2) m from
-    it;  offset_ne: (N, 2) m, the formation;  run_up_ne: (2,) m from here to where the first leg begins.
+    origin: (N, 3) of each vehicle's own origin, latitude, longitude [degrees], altitude [m];  position_ne: (N, 2) m
+    from it;  offset_ne: (N, 2) m, the formation;  run_up_ne: (2,) m from here to where the first leg begins.
     """
     latitude, longitude = float(origin[0, 0]), float(origin[0, 1])
     tiny = 1e-4  # degrees, some 10 m: the curve of the Earth is 0.01 mm there

@@ -1,4 +1,4 @@
-"""The truth of simulated vehicles (SIM_STATE of component 200), for whoever records and scores; nothing that decides reads it."""
+"""The truth of simulated vehicles (SIM_STATE of component 200), for whoever records and scores, never for control."""
 
 from __future__ import annotations
 

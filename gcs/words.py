@@ -16,6 +16,7 @@ def verdict(summary: Summary) -> str:
     on = "" if summary.scored_on == "truth" else " (by telemetry: no truth was told)"
     return (
         f"{flight}\n{passed}: heading off by {summary.heading_error_deg:.1f}°, "
-        f"{summary.distance_to_target_m:.1f} m from the target, never closer than {summary.min_separation_m:.1f} m{on}\n"
+        f"{summary.distance_to_target_m:.1f} m from the target, "
+        f"robots never closer than {summary.min_separation_m:.1f} m{on}\n"
         f"{summary.simulated_s:.1f} s flown at {summary.real_time_factor:.0f} × real time"
     )

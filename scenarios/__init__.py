@@ -1,4 +1,4 @@
-"""Scenarios: what is flown, by whom, what goes wrong and what counts as success. Data and a loader; knows no IO but files."""
+"""Scenarios: what is flown, by whom, what goes wrong, what counts as success. Data and a loader."""
 
 from scenarios.layout import offsets_ne
 from scenarios.loading import ScenarioError, find, load, names, parse

@@ -1,4 +1,7 @@
-"""From a TOML file, or the name of one that ships, to a checked `Scenario`; every refusal names key, value and what is allowed."""
+"""From a TOML file, or the name of one that ships, to a checked `Scenario`.
+
+Every refusal names the key, the value and what is allowed.
+"""
 
 from __future__ import annotations
 

@@ -94,8 +94,8 @@ def decide(observation: Observation, virtual: VirtualLeader, settings: Settings)
     command = consensus.copy()
     leaders, place = settings.leaders, position - settings.offset_ne
     if settings.swarm_feedback:
-        # Followers know no path: whatever the leaders' feedback sums up to shears the formation and stays, and the mean is
-        # off by it. So leaders answer for the mean, and the formation closes behind them (docs/recommended-profile.md).
+        # Followers know no path: whatever the leaders' feedback sums up to shears the formation and stays, and the mean
+        # is off by it. So leaders answer for the mean, and the formation closes up (docs/recommended-profile.md).
         swarm_place = weighted_mean(graph, weights, place)
         followers_a_leader = np.count_nonzero(heard & (observation.trust >= settings.threshold)) / len(leaders)
         command -= settings.formation_gain * (place - swarm_place)

@@ -39,10 +39,10 @@ def navigational_feedback(
     u^γ = −c1 (x_i − x_γ + δx) − c2 (v_i − v_γ + δu) + lead_s a_γ
 
     place_ne: (L, 2) m, x_i + δx with the formation's offset taken off;  velocity_ne: (L, 2) m/s, v_i + δu.
-    Measured of the leader itself, both hold all accumulated error already (δx = δu = 0); taken over the robots it trusts,
-    δx and δu are the shift of the swarm against the leader. c1 in 1/s, c2 without unit.
-    lead_s: feed-forward of the virtual leader's acceleration [s], our addition; the paper has none. Consensus over N robots
-    that answer in τ seconds gives their mean velocity v̄̇ = (L/N) u^γ / τ, so τ N / L makes the mean accelerate as it does.
+    Measured of the leader itself, both hold all accumulated error already (δx = δu = 0); taken over the robots it
+    trusts, δx and δu are the shift of the swarm against the leader. c1 in 1/s, c2 without unit.
+    lead_s: feed-forward of the virtual leader's acceleration [s], our addition; the paper has none. Consensus over N
+    robots that answer in τ seconds accelerates their mean velocity by (L/N) u^γ / τ, so τ N / L gives it a_γ.
     """
     wanted = -c1 * (place_ne - virtual.position_ne) - c2 * (velocity_ne - virtual.velocity_ne)
     length = np.hypot(wanted[:, 0], wanted[:, 1])

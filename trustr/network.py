@@ -34,7 +34,8 @@ class Graph:
 
     def sum_by_receiver(self, values: Array) -> Array:
         """Sum (E,) edge values over what each robot hears: (N,)."""
-        return np.bincount(self.receiver, weights=values, minlength=self.count)
+        sums: Array = np.bincount(self.receiver, weights=values, minlength=self.count).astype(np.float64, copy=False)
+        return sums
 
     def dense(self, values: Array) -> Array:
         """Edge values as an (N, N) matrix, row i is what robot i hears; 0 where there is no edge."""
@@ -46,8 +47,8 @@ class Graph:
 def neighbours(position_ne: Array, heard: npt.NDArray[np.bool_], *, range_m: float) -> Graph:
     """The communication graph E = {(i, j) | j ∈ N_i} of the paper, N_i = {j : ‖x_i − x_j‖ < R}, self edges added.
 
-    position_ne: (N, 2) m;  heard: (N,) False for robots whose data are stale: they neither speak nor listen, and are left
-    with their edge to themselves;  range_m: R.
+    position_ne: (N, 2) m;  heard: (N,) False for robots whose data are stale: they neither speak nor listen, and are
+    left with their edge to themselves;  range_m: R.
     """
     count = len(position_ne)
     position = np.where(heard[:, None], position_ne, np.inf) if not heard.all() else position_ne
@@ -92,8 +93,8 @@ def communication_quality(
     """Quality f_ij of what i hears from j, eq. 13: ½ (g_i + g_j) η E(d_ij), (E,) in [0, 1].
 
     trust: (N,) g in [0, 1];  range_m, best_range_m, decay: R, ρ, γ with 0 < ρ < R.
-    weights: with "sender", η is `eta` for senders with trust below `threshold` and 1 for the others. With "literal" η is one
-    constant as the paper prints it; it then cancels in eq. 17, where f_ii carries it too.
+    weights: with "sender", η is `eta` for senders with trust below `threshold` and 1 for the others. With "literal" η
+    is one constant as the paper prints it; it then cancels in eq. 17, where f_ii carries it too.
     """
     mean_trust = 0.5 * (trust[graph.receiver] + trust[graph.sender])
     beyond = np.maximum(graph.distance - best_range_m, 0.0)

@@ -41,8 +41,8 @@ class Frame(NamedTuple):
 class Framer:
     """Cuts what one peer sends into frames.
 
-    Datagrams are cut one at a time with nothing kept between them: a header that claims more bytes than its datagram has
-    can otherwise swallow the genuine frames behind it. After a failure the search goes on at the next byte.
+    Datagrams are cut one at a time with nothing kept between them: a header that claims more bytes than its datagram
+    has can otherwise swallow the genuine frames behind it. After a failure the search goes on at the next byte.
     """
 
     def __init__(self) -> None:

@@ -1,7 +1,7 @@
 """Payloads of the messages that fly many times a second, packed by hand.
 
-pymavlink takes 15–20 µs a message for what `struct` does in one (docs/speed.md). Field order is the wire's: larger types
-first. Tests hold every one to pymavlink's bytes. Page: https://mavlink.io/en/messages/common.html
+pymavlink takes 15–20 µs a message for what `struct` does in one (docs/speed.md). Field order is the wire's: larger
+types first. Tests hold every one to pymavlink's bytes. Page: https://mavlink.io/en/messages/common.html
 """
 
 from __future__ import annotations

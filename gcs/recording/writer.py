@@ -59,7 +59,7 @@ class Recorder:
     def close(self) -> None:
         """Write the summary."""
         if not self._file.closed:
-            self._writer.finish()
+            self._writer.finish()  # type: ignore[no-untyped-call]
             self._file.close()
 
     def add_metadata(self, name: str, values: dict[str, str]) -> None:
@@ -97,7 +97,7 @@ class Recorder:
         turn = topics.TickTopic(number, len(tick.frames), tick.lateness_ns, diagnosis.phase.value, list(tick.events))
         self._write(time_ns, "/tick", turn)
         if time_ns - self._flushed_ns >= FLUSH_NS:
-            self._writer.flush()
+            self._writer.flush()  # type: ignore[no-untyped-call]
             self._flushed_ns = time_ns
 
     def _mission(self, tick: Tick) -> None:
