@@ -30,7 +30,7 @@ _CONTROLLER_OUTPUTS: Final = ("control/thrust", "mixer/roll-plus-pitch", "contro
 Vector = tuple[float, float, float]
 
 
-class FlightModelDiverged(RuntimeError):  a state of the world, not a programming error
+class FlightModelDiverged(RuntimeError):
     """The flight model's state is no longer finite; the vehicle cannot be flown on and must be rebuilt."""
 
 
