@@ -20,7 +20,7 @@ class Server:
     """Vehicles speak to one address each, or all to one; whoever answers from there is listened to.
 
     shared: all vehicles send from one socket to the connection's port. separate: vehicle i sends from a socket of its
-    own to that port + i − 1.
+    own to that port + i − 1. On udpin they are silent until somebody speaks to them.
     """
 
     def __init__(self, world: World, to: Connection, *, ports: Literal["shared", "separate"], speed: float) -> None:
@@ -82,4 +82,6 @@ class Server:
     def _send(self) -> None:
         for _step, system, frame in self._world.collect():
             port = self._port_of[system - 1]
-            port.send(frame, self._peers.get(port))
+            peer = self._peers.get(port)
+            if peer is not None or port.connection.kind == "udpout":
+                port.send(frame, peer)
