@@ -30,7 +30,7 @@ def admit(asked_ned: Array, before_ned: Array, limits: Limits, *, dt: float) -> 
     A set-point that is not finite becomes zero velocity. Speed is clamped before acceleration, and a clamped
     acceleration ends between two allowed velocities, so both bounds hold at once.
     """
-    finite: npt.NDArray[np.bool_] = np.isfinite(asked_ned).all(axis=1)
+    finite = np.asarray(np.isfinite(asked_ned).all(axis=1))
     wanted = np.where(finite[:, None], asked_ned, 0.0)
     wanted = _shorten(wanted, limits.speed)
     change = wanted - before_ned

@@ -1,0 +1,40 @@
+# make fly   set up, then fly the emergency twice, side by side
+# make test  set up, then run every test
+# make check ruff and mypy;  make soak  the same claims at large counts;  make bench  the benchmarks
+
+PYTHON ?= python3
+VENV   ?= .venv
+BIN    := $(VENV)/bin
+RUNS   ?= runs/emergency
+JOBS   ?= 2
+
+.PHONY: setup fly test check soak bench clean
+
+$(VENV)/.ready: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	touch $@
+
+setup: $(VENV)/.ready
+
+fly: setup
+	$(BIN)/gcs run emergency --controller average --out $(RUNS)/average
+	$(BIN)/gcs run emergency --controller trust-r --out $(RUNS)/trust-r
+	$(BIN)/gcs compare $(RUNS)/average $(RUNS)/trust-r --out $(RUNS)/comparison.png
+
+test: setup
+	$(BIN)/pytest --numprocesses $(JOBS)
+
+check: setup
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+soak: setup
+	TRUSTR_PROFILE=soak $(BIN)/pytest --numprocesses $(JOBS) --timeout 7200
+
+bench: setup
+	$(BIN)/python -m tests.benchmarks
+
+clean:
+	rm -rf $(VENV) runs build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
