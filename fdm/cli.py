@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import sys
 from typing import Annotated, Literal
@@ -44,8 +45,10 @@ def serve(
     from scenarios import ScenarioError, load
     from wire.connection import ConnectionRefused, parse
 
-    if speed <= 0:
-        return _refuse(f"--speed {speed}: must be above 0")
+    if not 0.0 < speed < math.inf:
+        return _refuse(f"--speed {speed}: must be a number above 0")
+    if seed < 0:
+        return _refuse(f"--seed {seed}: must not be negative")
     try:
         loaded = load(scenario, overrides=set_)
         connections = parse(to)
