@@ -30,7 +30,7 @@ def serve(
     scenario
         A scenario's name (see `gcs scenarios`), or the path of a TOML file.
     to
-        Where the vehicles send: udpout:HOST:PORT.
+        Where the vehicles send: udpout:HOST:PORT; or where they wait to be spoken to: udpin:HOST:PORT.
     ports
         shared: all to that port. separate: vehicle i to PORT + i - 1.
     speed
@@ -54,6 +54,9 @@ def serve(
         connections = parse(to)
         if len(connections) > 1:
             return _refuse(f"--to {to}: one port; with --ports separate the others follow it")
+        last = connections[0].port + loaded.swarm.count - 1
+        if ports == "separate" and last > 65535:
+            return _refuse(f"--to {to}: {loaded.swarm.count} vehicles would need ports up to {last}, beyond 65535")
         server = Server(World(loaded, seed=seed), connections[0], ports=ports, speed=speed)
     except (ScenarioError, ConnectionRefused) as error:
         return _refuse(str(error))
