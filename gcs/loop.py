@@ -83,7 +83,7 @@ def fly(
         asked = events()
         swarm = observe(swarm, frames)
         state, commands, diagnosis = decide(state, swarm, asked, now_ns)
-        time_ms = (now_ns - start_ns) // 1_000_000
+        time_ms = number * period_ns // 1_000_000
         for system, command in commands:
             link.send(system, encoders[system].encode(command, time_ms))
         tick = Tick(number, now_ns, now_ns - deadline_ns, frames, asked, swarm, state, diagnosis)
