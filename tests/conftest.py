@@ -1,0 +1,15 @@
+"""How hard property tests try: TRUSTR_PROFILE=test (the same few examples every time) or soak (many, always new)."""
+
+import os
+
+from hypothesis import HealthCheck, settings
+
+SOAK_EXAMPLES = 20_000
+
+settings.register_profile(
+    "test", max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.register_profile(
+    "soak", max_examples=SOAK_EXAMPLES, deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile(os.environ.get("TRUSTR_PROFILE", "test"))

@@ -1,0 +1,176 @@
+"""One tick of the swarm's control."""
+
+from dataclasses import replace
+from math import inf, nan
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from gcs.control import settings
+from scenarios import load
+from trustr.controller import Observation, decide
+from trustr.leader import VirtualLeader
+from trustr.separation import separation
+
+PROFILES = ("paper", "recommended")
+SETTINGS = {name: settings(load("transit", overrides=[f"control.profile={name}"])) for name in PROFILES}
+VIRTUAL = VirtualLeader(np.array([3.0, 4.0]), np.array([1.2, 0.9]), np.array([0.5, -0.5]))
+REST = VirtualLeader(*np.zeros((3, 2)))
+
+profiles = pytest.mark.parametrize("profile", PROFILES)
+
+
+@st.composite
+def observations(draw):
+    def six(columns, elements):
+        return draw(arrays(float, (6, columns), elements=elements))
+
+    wild = st.sampled_from([nan, inf, -inf])
+    return Observation(
+        position_ne=six(2, st.floats(-40, 40) | wild),
+        velocity_ne=six(2, st.floats(-3, 3) | wild),
+        heard=draw(arrays(bool, 6)),
+        trust=six(1, st.floats(0, 1))[:, 0],
+    )
+
+
+def in_formation(chosen, *, velocity=(0.0, 0.0), trust=1.0):
+    return Observation(
+        chosen.offset_ne.copy(), np.tile(np.array(velocity), (6, 1)), np.ones(6, bool), np.full(6, trust)
+    )
+
+
+@profiles
+@given(observations())
+def test_every_command_is_finite_and_the_unheard_are_told_to_stand_still(profile, observation):
+    decision = decide(observation, VIRTUAL, SETTINGS[profile])
+    known = np.isfinite(observation.position_ne).all(1) & np.isfinite(observation.velocity_ne).all(1)
+    assert np.isfinite(decision.velocity_ne).all()
+    assert not decision.velocity_ne[~(observation.heard & known)].any()
+
+
+@profiles
+@given(observations(), st.integers(0, 5), st.sampled_from([nan, inf, -inf]))
+def test_a_robot_that_tells_no_number_is_as_good_as_silent(profile, observation, robot, value):
+    """Whatever else it says, nobody's command changes."""
+    silent, babbling = observation.heard.copy(), observation.velocity_ne.copy()
+    silent[robot], babbling[robot, 1] = False, value
+    one = decide(replace(observation, velocity_ne=babbling), VIRTUAL, SETTINGS[profile])
+    other = decide(replace(observation, heard=silent), VIRTUAL, SETTINGS[profile])
+    assert (one.velocity_ne == other.velocity_ne).all()
+
+
+@profiles
+@given(observations(), st.integers(0, 5), arrays(float, 4, elements=st.floats(-99, 99)))
+def test_what_a_silent_robot_was_last_heard_to_say_does_not_count(profile, observation, robot, said):
+    heard, position, velocity = (
+        value.copy() for value in (observation.heard, observation.position_ne, observation.velocity_ne)
+    )
+    heard[robot], position[robot], velocity[robot] = False, said[:2], said[2:]
+    silent = replace(observation, heard=heard)
+    one = decide(silent, VIRTUAL, SETTINGS[profile])
+    other = decide(replace(silent, position_ne=position, velocity_ne=velocity), VIRTUAL, SETTINGS[profile])
+    assert (one.velocity_ne == other.velocity_ne).all()
+
+
+@profiles
+@given(observations(), st.randoms(use_true_random=False))
+def test_names_of_robots_do_not_matter(profile, observation, random):
+    order = list(range(6))
+    random.shuffle(order)
+    chosen = SETTINGS[profile]
+    renamed = Observation(
+        *(
+            value[order]
+            for value in (observation.position_ne, observation.velocity_ne, observation.heard, observation.trust)
+        )
+    )
+    leaders = np.array([order.index(leader) for leader in chosen.leaders])
+    command = decide(renamed, VIRTUAL, replace(chosen, offset_ne=chosen.offset_ne[order], leaders=leaders)).velocity_ne
+    assert command == pytest.approx(decide(observation, VIRTUAL, chosen).velocity_ne[order], abs=1e-9)
+
+
+@profiles
+@given(observations(), st.floats(-np.pi, np.pi))
+def test_turning_the_world_turns_the_commands(profile, observation, angle):
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    chosen = SETTINGS[profile]
+    known = (
+        observation.heard & np.isfinite(observation.position_ne).all(1) & np.isfinite(observation.velocity_ne).all(1)
+    )
+    position, velocity = (
+        np.where(known[:, None], value, 0.0) for value in (observation.position_ne, observation.velocity_ne)
+    )
+    seen = replace(observation, position_ne=position, velocity_ne=velocity, heard=known)
+    turned = decide(
+        replace(seen, position_ne=seen.position_ne @ turn, velocity_ne=seen.velocity_ne @ turn),
+        VirtualLeader(VIRTUAL.position_ne @ turn, VIRTUAL.velocity_ne @ turn, VIRTUAL.acceleration_ne @ turn),
+        replace(chosen, offset_ne=chosen.offset_ne @ turn),
+    )
+    still = decide(seen, VIRTUAL, chosen)
+    assert turned.velocity_ne == pytest.approx(still.velocity_ne @ turn, abs=1e-6)
+
+
+@profiles
+def test_a_formation_in_its_place_and_at_cruise_flies_on_as_it_is(profile):
+    chosen = SETTINGS[profile]
+    cruise = VirtualLeader(np.zeros(2), np.array([1.2, 0.9]), np.zeros(2))
+    command = decide(in_formation(chosen, velocity=(1.2, 0.9)), cruise, chosen).velocity_ne
+    assert command == pytest.approx(np.tile([1.2, 0.9], (6, 1)))
+
+
+@profiles
+def test_only_leaders_know_of_the_virtual_leader(profile):
+    chosen = SETTINGS[profile]
+    near, far = (
+        decide(in_formation(chosen), VirtualLeader(np.array([north, 0.0]), np.zeros(2), np.zeros(2)), chosen)
+        for north in (0.0, 1.0)
+    )
+    moved = (far.velocity_ne - near.velocity_ne)[:, 0]
+    followers = np.setdiff1d(np.arange(6), chosen.leaders)
+    assert moved[chosen.leaders] == pytest.approx(chosen.c1)
+    assert not moved[followers].any()
+
+
+def test_in_the_papers_profile_nothing_but_feedback_and_separation_is_added_to_the_consensus():
+    chosen = SETTINGS["paper"]
+    rng = np.random.default_rng(3)
+    seen = replace(in_formation(chosen), position_ne=rng.uniform(0, 4, (6, 2)), velocity_ne=rng.uniform(-1, 1, (6, 2)))
+    decision = decide(seen, REST, replace(chosen, c1=0.0, c2=0.0))
+    consensus = decision.graph.dense(decision.weights) @ seen.velocity_ne
+    push = separation(decision.graph, seen.position_ne, radius=chosen.separation_radius, gain=chosen.separation_gain)
+    assert push.any()
+    assert decision.velocity_ne == pytest.approx(consensus + push)
+
+
+def test_the_formation_gain_brings_a_displaced_robot_back_without_moving_the_mean():
+    chosen = replace(SETTINGS["recommended"], c1=0.0, c2=0.0)
+    displaced = in_formation(chosen)
+    displaced.position_ne[4] += [0.6, 0.0]
+    command = decide(displaced, REST, chosen).velocity_ne
+    back = -chosen.formation_gain * (np.eye(6)[4] - 1 / 6) * 0.6
+    assert command == pytest.approx(np.column_stack([back, np.zeros(6)]), abs=1e-3)  # ρ is 6 m, and two are 7 m apart
+    assert command.sum(0) == pytest.approx([0, 0], abs=1e-2)
+
+
+def test_a_distrusted_robot_out_of_its_place_does_not_draw_the_others_along():
+    chosen = replace(SETTINGS["recommended"], eta=0.0)
+    trust = np.array([1, 1, 1, 1, 0, 1.0])
+    seen = replace(in_formation(chosen), trust=trust)
+    seen.position_ne[4] += [-2.0, -2.0]
+    command = decide(seen, REST, chosen).velocity_ne
+    assert command[trust > 0] == pytest.approx(np.zeros((5, 2)), abs=1e-12)
+    assert (command[4] > 0).all()
+
+
+@profiles
+def test_what_is_observed_stays_as_it_was(profile):
+    chosen = SETTINGS[profile]
+    seen = in_formation(chosen, velocity=(1.0, 0.0))
+    before = seen.position_ne.copy(), seen.velocity_ne.copy()
+    decide(seen, VIRTUAL, chosen)
+    assert (seen.position_ne == before[0]).all()
+    assert (seen.velocity_ne == before[1]).all()
