@@ -107,11 +107,11 @@ def missions(draw):
     """Plans whose unforeseen legs are long enough to swing onto and to brake on."""
     heading = st.floats(-180, 180)
     cruise = draw(st.sampled_from([0.5, 1.0, 1.5, 3.0]))
-    lengths = draw(st.lists(st.floats(0.5, 30), min_size=1, max_size=4))
+    lengths = [cruise * seconds for seconds in draw(st.lists(st.floats(0.5, 20), min_size=1, max_size=4))]
     legs = ", ".join(f'{{task="leg", heading_deg={draw(heading)}, length_m={length}}}' for length in lengths)
     event = ""
     if draw(st.booleans()):
-        at = sum(lengths[:-1]) + draw(st.floats(0.1, 0.9)) * lengths[-1]
+        at = sum(lengths[:-1]) + draw(st.floats(0.3, 0.9)) * lengths[-1]
         length = (SWING_S + TURN_S + draw(st.floats(0, 10))) * cruise
         event = f'{{kind="redirect", at_length_m={at}, task="call", heading_deg={draw(heading)}, length_m={length}}}'
     text = f'title = "any"\nevent = [{event}]\n[mission]\ncruise_m_s = {cruise}\nleg = [{legs}]'
@@ -129,14 +129,14 @@ def at(leader, path, times):
 
 @given(missions())
 def test_the_recommended_leader_never_jumps_in_place_or_velocity(path):
-    """Trapezoids between samples: the curve itself is off by millimetres at most, where acceleration steps."""
+    """Between samples it moves as its velocity says, and its velocity changes as its acceleration says."""
     step = 0.05
     times = np.arange(-1.0, path.read_out_s + 1.0, step)
     position, velocity, acceleration = at(recommended_leader, path, times)
+    strongest = 1.05 * np.linalg.norm(acceleration, axis=1).max() + 1e-9
     moved = np.diff(position, axis=0) - step * 0.5 * (velocity[1:] + velocity[:-1])
-    assert np.abs(moved).max() < 5e-3
-    strongest = np.linalg.norm(acceleration, axis=1).max()
-    assert np.linalg.norm(np.diff(velocity, axis=0), axis=1).max() <= strongest * step * 1.01 + 1e-9
+    assert np.linalg.norm(moved, axis=1).max() <= strongest * step**2 / 4
+    assert np.linalg.norm(np.diff(velocity, axis=0), axis=1).max() <= strongest * step
 
 
 @every_mission
