@@ -34,17 +34,9 @@ class World:
     def step(self, steps: int) -> None:
         """Let this many physics steps pass."""
         target = self.steps + steps
-        if self._mission_step is None:
-            self._mission_step = self._first_motion()
-        if self._mission_step is not None and self.steps <= self._mission_step < target:
-            self._burst(self._mission_step - self.steps)
-            for endpoint in self.endpoints:
-                endpoint.begin_mission()
-        self._burst(target - self.steps)
-        if self._mission_step is not None and not any(endpoint.pilot.armed for endpoint in self.endpoints):
-            self._mission_step = None
-            for endpoint in self.endpoints:
-                endpoint.end_mission()
+        while self.steps < target:
+            self._open_or_close_the_mission()
+            self._burst(min(target, self._next_turn(target)) - self.steps)
 
     @property
     def next_event_step(self) -> int:
@@ -59,11 +51,30 @@ class World:
         sent.sort(key=lambda entry: entry[0])
         return sent
 
-    def _burst(self, steps: int) -> None:
-        if steps > 0:
+    def _open_or_close_the_mission(self) -> None:
+        if self._mission_step is None:
+            self._mission_step = self._first_motion()
+        if self._mission_step is None:
+            return
+        if not any(endpoint.pilot.armed for endpoint in self.endpoints):
+            self._mission_step = None
             for endpoint in self.endpoints:
-                endpoint.step(steps)
-            self.steps += steps
+                endpoint.end_mission()
+        elif self._mission_step == self.steps:
+            for endpoint in self.endpoints:
+                endpoint.begin_mission()
+
+    def _next_turn(self, target: int) -> int:
+        """The step at which the mission may open or close: nobody disarms but where something is due."""
+        if self._mission_step is None:
+            return target
+        opens = self._mission_step if self._mission_step > self.steps else target
+        return min(opens, self.next_event_step)
+
+    def _burst(self, steps: int) -> None:
+        for endpoint in self.endpoints:
+            endpoint.step(steps)
+        self.steps += steps
 
     def _first_motion(self) -> int | None:
         """The step of mission start, once a vehicle was asked to move: the run-up comes first."""
