@@ -19,8 +19,8 @@ from fdm.vehicle import Geodetic, Vehicle
 from wire.frames import Frame, Framer, decode
 from wire.payloads import SET_POSITION_TARGET_LOCAL_NED, PositionTarget, unpack_position_target
 
-GUIDANCE, TRUTH = -2, -1
-"""Keys of the schedule that are no message ids: flying, and the truth."""
+GUIDANCE, WATCHDOG, TRUTH = -3, -2, -1
+"""Keys of the schedule that are no message ids: flying, the end of patience with silent set-points, the truth."""
 TRUTH_PERIOD_S = 0.1
 
 VELOCITY_MASKS = frozenset({0x0DC7, 0x09C7, 0x05C7, 0x0FC7})
@@ -148,6 +148,8 @@ class Endpoint:
                 self._surroundings.renew(self.vehicle, now.time_s)
                 self._take(modes.advance(self._pilot, now, self._failsafe), now)
                 self._fly(now, dt=PERIOD_S)
+            elif key == WATCHDOG:
+                self._watch(now)
             elif key == TRUTH:
                 self._send(self._reporter.truth())
             else:
@@ -192,8 +194,24 @@ class Endpoint:
         if self.first_motion_step is None and math.hypot(north, east) > STANDS_STILL:
             self.first_motion_step = self.vehicle.steps
         self._pilot = modes.hear(self._pilot, setpoint)
+        if not self._schedule.has(WATCHDOG):
+            self._be_patient(setpoint)
         if self._pilot.mode is Mode.OFFBOARD:
             self._fly(self._situation(), dt=0.0)
+
+    def _be_patient(self, setpoint: Setpoint) -> None:
+        """Look again at the step at which this set-point will be too old."""
+        silence = math.ceil(self._failsafe.setpoint_silence_s * self._hz)
+        self._schedule.once(WATCHDOG, step=round(setpoint.time_s * self._hz) + silence)
+
+    def _watch(self, now: Situation) -> None:
+        """The set-point waited for is too old, or a newer one has come meanwhile."""
+        setpoint = self._pilot.setpoint
+        if setpoint is not None and modes.hears_setpoints(self._pilot, now, self._failsafe):
+            self._be_patient(setpoint)
+            return
+        self._take(modes.advance(self._pilot, now, self._failsafe), now)
+        self._fly(now, dt=0.0)
 
     def _setpoint(self, target: PositionTarget) -> Setpoint | None:
         """The velocity set-point in a message; None where it is none that we fly."""

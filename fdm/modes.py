@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import NamedTuple
 
 Vector = tuple[float, float, float]
 
@@ -77,8 +78,7 @@ class Setpoint:
     """rad/s."""
 
 
-@dataclass(frozen=True, slots=True)
-class Situation:
+class Situation(NamedTuple):
     """What the vehicle is and where, at one instant."""
 
     time_s: float
@@ -155,7 +155,7 @@ def take_off(pilot: Pilot, now: Situation, height: float) -> Outcome:
 
 def set_mode(pilot: Pilot, now: Situation, mode: Mode, failsafe: Failsafe) -> Outcome:
     """Change to HOLD, OFFBOARD or LAND."""
-    if mode is Mode.OFFBOARD and not _hears_setpoints(pilot, now, failsafe):
+    if mode is Mode.OFFBOARD and not hears_setpoints(pilot, now, failsafe):
         return _refuse(pilot, "Offboard denied: no set-points are coming")
     if mode is pilot.mode:
         return Outcome(replace(pilot, land_at_s=None))
@@ -165,6 +165,12 @@ def set_mode(pilot: Pilot, now: Situation, mode: Mode, failsafe: Failsafe) -> Ou
 def hear(pilot: Pilot, setpoint: Setpoint) -> Pilot:
     """Take note of a set-point; OFFBOARD flies it."""
     return replace(pilot, setpoint=setpoint)
+
+
+def hears_setpoints(pilot: Pilot, now: Situation, failsafe: Failsafe) -> bool:
+    """Whether the last set-point is young enough to fly by."""
+    age_s = math.inf if pilot.setpoint is None else now.time_s - pilot.setpoint.time_s
+    return age_s < failsafe.setpoint_silence_s
 
 
 def advance(pilot: Pilot, now: Situation, failsafe: Failsafe) -> Outcome:
@@ -180,7 +186,7 @@ def advance(pilot: Pilot, now: Situation, failsafe: Failsafe) -> Outcome:
     if pilot.mode is Mode.TAKEOFF and pilot.anchor_ned is not None:
         if abs(now.position_ned[2] - pilot.anchor_ned[2]) < REACHED:
             return Outcome(replace(pilot, mode=Mode.HOLD), words=((Severity.INFO, "Take-off height reached"),))
-    elif pilot.mode is Mode.OFFBOARD and not _hears_setpoints(pilot, now, failsafe):
+    elif pilot.mode is Mode.OFFBOARD and not hears_setpoints(pilot, now, failsafe):
         lost = replace(pilot, mode=Mode.HOLD, anchor_ned=None, land_at_s=now.time_s + failsafe.land_after_s)
         return Outcome(lost, words=((Severity.CRITICAL, "Set-points lost: holding"),))
     elif pilot.land_at_s is not None and now.time_s >= pilot.land_at_s:
@@ -210,10 +216,6 @@ def heading(pilot: Pilot, dt: float) -> float:
         return pilot.yaw
     yaw = pilot.yaw if setpoint.yaw is None else setpoint.yaw
     return math.remainder(yaw + setpoint.yaw_rate * dt, math.tau)
-
-
-def _hears_setpoints(pilot: Pilot, now: Situation, failsafe: Failsafe) -> bool:
-    return pilot.setpoint is not None and now.time_s - pilot.setpoint.time_s <= failsafe.setpoint_silence_s
 
 
 def _watch_the_ground(pilot: Pilot, now: Situation) -> Pilot:

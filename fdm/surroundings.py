@@ -14,7 +14,7 @@ from fdm.noise import Purpose, generator, gusts, white
 from fdm.vehicle import Vehicle
 from scenarios import Scenario, direction
 
-PERIOD_S = 0.05
+PERIOD_S = 0.1
 """How often the air is renewed."""
 
 

@@ -15,14 +15,14 @@ from gcs.commands import Arm, ChangeMode, Command, Land, RequestMessage, Request
 from gcs.telemetry import Swarm
 from wire.modes import PX4_MODES
 
-STREAMS_S: tuple[tuple[int, float], ...] = (
-    (messages.LOCAL_POSITION_NED, 0.05),
-    (messages.ATTITUDE, 0.5),
+SLOW_S: tuple[tuple[int, float], ...] = (
+    (messages.ATTITUDE, 1.0),
     (messages.SYS_STATUS, 1.0),
-    (messages.EXTENDED_SYS_STATE, 0.5),
-    (messages.GLOBAL_POSITION_INT, 0.0),
+    (messages.EXTENDED_SYS_STATE, 1.0),
+    (messages.BATTERY_STATUS, 2.0),
+    (messages.GLOBAL_POSITION_INT, -1e-6),
 )
-"""Message id and interval of what we use; 0 turns off what we do not."""
+"""Message id and interval of what we use now and then; −1 µs turns off what we do not use."""
 
 AT_HEIGHT = 0.3
 """m: off the height asked for."""
@@ -37,11 +37,13 @@ class Px4:
 
     height_m: float
     """Above each vehicle's home."""
+    period_s: float
+    """Between two ticks: position and velocity are asked for once in each."""
 
     def subscribe(self) -> tuple[Command, ...]:
         """What to ask of a vehicle when it is first heard."""
-        streams = [RequestStream(message, interval_s or -1e-6) for message, interval_s in STREAMS_S]
-        return (*streams, RequestMessage(messages.GPS_GLOBAL_ORIGIN))
+        streams = ((messages.LOCAL_POSITION_NED, self.period_s), *SLOW_S)
+        return (*(RequestStream(*stream) for stream in streams), RequestMessage(messages.GPS_GLOBAL_ORIGIN))
 
     def known(self, swarm: Swarm, row: int) -> bool:
         """All that must be known before arming has been told."""

@@ -20,6 +20,7 @@ from gcs.lockstep import Lockstep
 from gcs.loop import fly
 from gcs.scoring import Score, score
 from gcs.track import Tracker
+from gcs.truth import Truth
 from scenarios import Scenario, load
 
 SCENARIOS = ("transit", "emergency")
@@ -158,9 +159,10 @@ def one_flight(condition: Condition, seed: int) -> Score:
     """Fly one condition once, in lockstep, take-off to landing."""
     scenario = condition.build()
     flight = Flight(scenario)
-    tracker = Tracker(flight)
+    truth = Truth(flight.ids)
+    tracker = Tracker(flight, truth)
     world = Lockstep.of(scenario, seed=seed)
-    state = fly(world, world, flight, (tracker,), period_ns=scenario.time.period_ns)
+    state = fly(world, world, flight, (truth, tracker), period_ns=scenario.time.period_ns)
     result = None if tracker.track is None else score(tracker.track, scenario)
     if result is None or state.problem is not None:
         raise RuntimeError(f"{condition}, seed {seed}: {state.problem or 'ended before its read-out'}")

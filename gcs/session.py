@@ -17,6 +17,7 @@ from gcs.recording.writer import Recorder, RecordingError, Tap
 from gcs.scoring import Score, score
 from gcs.summary import Summary, collision, severity_of, trust_of
 from gcs.track import Tracker
+from gcs.truth import Truth
 from scenarios import Scenario
 
 RECORDING = "run.mcap"
@@ -40,15 +41,16 @@ def flown(
     Raises RecordingError before take-off where `out` cannot be written.
     """
     flight = Flight(scenario)
-    tracker = Tracker(flight)
+    truth = Truth(flight.ids)
+    tracker = Tracker(flight, truth)
     began = time.perf_counter()
     start_ns = clock.now()
-    with Recorder(out / RECORDING, scenario, start_ns=start_ns, metadata=_metadata(name, seed)) as recorder:
+    with Recorder(out / RECORDING, scenario, truth, start_ns=start_ns, metadata=_metadata(name, seed)) as recorder:
         state = fly(
             Tap(link, clock, recorder),
             clock,
             flight,
-            (tracker, recorder, *watching(flight)),
+            (truth, tracker, recorder, *watching(flight)),
             period_ns=scenario.time.period_ns,
             events=operator.events,
         )

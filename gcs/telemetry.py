@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +15,7 @@ from pymavlink.dialects.v20.common import MAVError
 
 from gcs import messages
 from wire.frames import Frame, decode
-from wire.payloads import unpack_local_position
+from wire.payloads import LocalPosition, unpack_local_position
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -96,15 +96,15 @@ def observe(swarm: Swarm, frames: Iterable[Frame]) -> Swarm:
     return draft.finished()
 
 
-_ARRAYS = tuple(field.name for field in fields(Swarm) if field.name not in ("ids", "not_finite", "words"))
-
-
 class _Draft:
-    """A swarm being changed: arrays are copied once, at the first write to them."""
+    """A swarm being changed. Arrays are copied at the first write to them; positions, the many, are written together."""
 
     def __init__(self, swarm: Swarm) -> None:
         self._swarm = swarm
         self._copies: dict[str, npt.NDArray[np.generic]] = {}
+        self.boot_ms: list[int] = swarm.boot_ms.tolist()
+        self.positions: dict[int, tuple[int, LocalPosition]] = {}
+        """Row → (time of arrival [ns], the newest that arrived)."""
         self.not_finite = swarm.not_finite
         self.words: list[tuple[int, str]] = []
 
@@ -114,27 +114,34 @@ class _Draft:
             copy = self._copies[name] = getattr(self._swarm, name).copy()
         copy[row] = value
 
-    def get(self, name: str, row: int) -> float:
-        held = self._copies.get(name)
-        return float((getattr(self._swarm, name) if held is None else held)[row])
-
     def finished(self) -> Swarm:
         changed: dict[str, object] = dict(self._copies)
-        return replace(self._swarm, not_finite=self.not_finite, words=tuple(self.words), **changed)  # type: ignore[arg-type]
+        if self.positions:
+            changed |= self._placed(list(self.positions))
+        if self.words or self._swarm.words:
+            changed["words"] = tuple(self.words)
+        return replace(self._swarm, not_finite=self.not_finite, **changed)  # type: ignore[arg-type]
+
+    def _placed(self, rows: list[int]) -> dict[str, object]:
+        numbers = np.array([position for _, position in self.positions.values()])
+        position, velocity = self._swarm.position_ned.copy(), self._swarm.velocity_ned.copy()
+        position_ns = self._swarm.position_ns.copy()
+        position[rows], velocity[rows] = numbers[:, 1:4], numbers[:, 4:7]
+        position_ns[rows] = [time_ns for time_ns, _ in self.positions.values()]
+        boot_ms = np.array(self.boot_ms)
+        return {"position_ned": position, "velocity_ned": velocity, "position_ns": position_ns, "boot_ms": boot_ms}
 
 
 def _local_position(draft: _Draft, row: int, frame: Frame) -> None:
-    time_boot_ms, *numbers = unpack_local_position(frame.payload)
-    if not all(map(math.isfinite, numbers)):
+    position = unpack_local_position(frame.payload)
+    if not math.isfinite(sum(position)):  # a sum of finite float32s is finite in doubles
         draft.not_finite += 1
         return
-    late_ms = draft.get("boot_ms", row) - time_boot_ms
+    late_ms = draft.boot_ms[row] - position.time_boot_ms
     if 0 <= late_ms < REBOOTED_MS:
         return
-    draft.set("boot_ms", row, time_boot_ms)
-    draft.set("position_ned", row, tuple(numbers[:3]))
-    draft.set("velocity_ned", row, tuple(numbers[3:]))
-    draft.set("position_ns", row, frame.time_ns)
+    draft.boot_ms[row] = position.time_boot_ms
+    draft.positions[row] = frame.time_ns, position
 
 
 REBOOTED_MS = 2000

@@ -63,14 +63,13 @@ class Point:
 class Tracker:
     """A `Record` that keeps the track in memory."""
 
-    def __init__(self, flight: Flight) -> None:
-        self._truth = Truth(flight.ids)
+    def __init__(self, flight: Flight, truth: Truth) -> None:
+        self._truth = truth
         self._read_out_s = flight.plan.read_out_s
         self._points: list[Point] = []
 
     def tick(self, tick: Tick) -> None:
         """Keep this tick, if it belongs to the mission."""
-        self._truth.read(tick.frames)
         point = point_of(tick, self._truth)
         if point is not None:
             self._points.append(point)

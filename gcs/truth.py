@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from gcs import messages
+from gcs.loop import Tick
 from gcs.swarm_frame import SwarmFrame
 from gcs.telemetry import Swarm
-from wire.frames import Frame
 from wire.payloads import unpack_sim_state
 
 Array = npt.NDArray[np.float64]
 
 
 class Truth:
-    """The last true state that each vehicle told."""
+    """The last true state that each vehicle told: a `Record` that comes before those which read it."""
 
     def __init__(self, ids: Sequence[int]) -> None:
         self._rows = {system: row for row, system in enumerate(ids)}
@@ -25,9 +25,9 @@ class Truth:
         self.velocity_ned = np.full((len(ids), 3), np.nan)
         """(N, 3) m/s."""
 
-    def read(self, frames: Iterable[Frame]) -> None:
-        """Take in what came."""
-        for frame in frames:
+    def tick(self, tick: Tick) -> None:
+        """Take in what this turn of the loop received."""
+        for frame in tick.frames:
             if frame.component == messages.TRUTH and frame.message == messages.SIM_STATE and frame.system in self._rows:
                 state, row = unpack_sim_state(frame.payload), self._rows[frame.system]
                 self._geodetic[row] = state.lat_int / 1e7, state.lon_int / 1e7, state.alt

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import orjson
 from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader, SeekingReader
@@ -62,29 +63,30 @@ def read(path: Path) -> Flown:
     return Flown(path, loaded, metadata, Track.of(points, read_out_s=plan(loaded).read_out_s))
 
 
+POINTS = ("/mission", "/trust", "/truth/pose", "/swarm/state")
+
+
 def _points(reader: Any) -> Iterator[Point]:
-    """The mission's ticks, in order."""
-    mission: dict[int, dict[str, Any]] = {}
-    trust: dict[int, list[float]] = {}
-    pose: dict[int, list[list[float]]] = {}
-    for _schema, channel, message in reader.iter_messages(topics=["/mission", "/trust", "/truth/pose"]):
+    """The mission's ticks, in order; positions are telemetry where no truth was told."""
+    told: dict[str, dict[int, dict[str, Any]]] = {topic: {} for topic in POINTS}
+    for _schema, channel, message in reader.iter_messages(topics=POINTS):
         content = orjson.loads(message.data)
-        match channel.topic:
-            case "/mission":
-                mission[content["tick"]] = content
-            case "/trust":
-                trust[content["tick"]] = content["trust"]
-            case "/truth/pose":
-                pose[content["tick"]] = content["position_m"]
-    for tick in sorted(mission.keys() & pose.keys()):
-        there = mission[tick]
+        told[channel.topic][content["tick"]] = content
+    mission, trust, pose, telemetry = (told[topic] for topic in POINTS)
+    for tick, there in sorted(mission.items()):
+        measured = tick not in pose
         yield Point(
             time_s=there["mission_s"],
-            position=np.array(pose[tick]),
-            trust=np.array(trust[tick]),
+            position=_upwards(telemetry[tick]["position_m"]) if measured else np.array(pose[tick]["position_m"]),
+            trust=np.array(trust[tick]["trust"]),
             virtual_ne=np.array([there["north_m"], there["east_m"]]),
-            measured=False,
+            measured=measured,
         )
+
+
+def _upwards(position_ned: list[list[float | None]]) -> npt.NDArray[np.float64]:
+    """North, east, down as north, east, height; null is NaN."""
+    return np.array(position_ned, dtype=np.float64) * (1.0, 1.0, -1.0)
 
 
 def ticks(path: Path) -> Iterator[RecordedTick]:

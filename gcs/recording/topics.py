@@ -79,8 +79,20 @@ class SetpointTopic:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class FleetTopic:
+    """/swarm/state: where telemetry has all vehicles, every tick."""
+
+    tick: int
+    position_m: Table
+    """North, east of the swarm's origin, down from each vehicle's own."""
+    velocity_m_s: Table
+    age_s: Vector
+    """Of both."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class StateTopic:
-    """/uav/<sysid>/state: one vehicle as telemetry tells it."""
+    """/uav/<sysid>/state: one vehicle as telemetry tells it, twice a second."""
 
     tick: int
     position_m: Vector

@@ -19,6 +19,8 @@ from wire.frames import Frame
 
 FLUSH_NS = 80_000_000
 """A killed process loses no more of the recording than this and one tick."""
+STATE_EVERY_TICKS = 5
+"""Between two /uav/<id>/state: attitude, mode and battery do not come more often."""
 OPTIONS = orjson.OPT_SERIALIZE_NUMPY
 SCENARIO = "scenario.json"
 METADATA = "trustr"
@@ -31,7 +33,9 @@ class RecordingError(OSError):
 class Recorder:
     """One MCAP file: raw frames through a `Tap`, our topics tick by tick."""
 
-    def __init__(self, path: Path, scenario: Scenario, *, start_ns: int, metadata: dict[str, str]) -> None:
+    def __init__(
+        self, path: Path, scenario: Scenario, truth: Truth, *, start_ns: int, metadata: dict[str, str]
+    ) -> None:
         self.path = path
         self._file = _open(path)
         self._writer = Writer(self._file, compression=CompressionType.LZ4)
@@ -42,7 +46,7 @@ class Recorder:
         )
         self._raw: dict[tuple[int, int], int] = {}
         self._topics: dict[str, int] = {}
-        self._truth = Truth(range(1, scenario.swarm.count + 1))
+        self._truth = truth
         self._faults = scenario.fault
         self._active = [False] * len(scenario.fault)
         self._flushed_ns = start_ns
@@ -77,8 +81,7 @@ class Recorder:
     def tick(self, tick: Tick) -> None:
         """Our own topics of one turn of the loop."""
         number, time_ns, diagnosis = tick.number, tick.time_ns, tick.diagnosis
-        self._truth.read(tick.frames)
-        self._states(tick)
+        self._fleet(tick)
         if diagnosis.sent_ned is not None:
             self._write(
                 time_ns,
@@ -117,22 +120,25 @@ class Recorder:
                 self._active[index] = not self._active[index]
                 self._write(time_ns, "/truth/fault", _fault_topic(fault, mission_s))
 
-    def _states(self, tick: Tick) -> None:
+    def _fleet(self, tick: Tick) -> None:
         swarm = tick.swarm
         position = np.column_stack([tick.diagnosis.position_ne, swarm.position_ned[:, 2]])
-        age_s = (tick.time_ns - swarm.position_ns) / 1e9
-        for row, system in enumerate(swarm.ids):
-            state = topics.StateTopic(
-                tick=tick.number,
-                position_m=position[row],
-                velocity_m_s=swarm.velocity_ned[row],
-                attitude_rad=swarm.attitude_rpy[row],
-                age_s=float(age_s[row]) if swarm.position_ns[row] > 0 else float("nan"),
-                custom_mode=int(swarm.custom_mode[row]),
-                armed=bool(swarm.armed[row]),
-                battery=float(swarm.battery[row]),
-            )
-            self._write(tick.time_ns, f"/uav/{system}/state", state)
+        age_s = np.where(swarm.position_ns > 0, (tick.time_ns - swarm.position_ns) / 1e9, np.nan)
+        fleet = topics.FleetTopic(tick.number, position, swarm.velocity_ned, age_s)
+        self._write(tick.time_ns, "/swarm/state", fleet)
+        if tick.number % STATE_EVERY_TICKS == 0:
+            for row, system in enumerate(swarm.ids):
+                state = topics.StateTopic(
+                    tick=tick.number,
+                    position_m=position[row],
+                    velocity_m_s=swarm.velocity_ned[row],
+                    attitude_rad=swarm.attitude_rpy[row],
+                    age_s=float(age_s[row]),
+                    custom_mode=int(swarm.custom_mode[row]),
+                    armed=bool(swarm.armed[row]),
+                    battery=float(swarm.battery[row]),
+                )
+                self._write(tick.time_ns, f"/uav/{system}/state", state)
 
     def _write(self, time_ns: int, topic: str, message: Any) -> None:
         channel = self._topics.get(topic)

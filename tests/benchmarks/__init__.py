@@ -1,0 +1,1 @@
+"""Measurements, one process and one run each: `make bench`. Not tests: machines differ, ratios inside one run do not."""

@@ -1,0 +1,127 @@
+"""What the flight loop costs beside the physics it flies.
+
+CPU of a whole lockstep flight with its recording (imports, loading and the picture left out), against a bare loop that steps
+the same six vehicles as many steps in bursts of 25. The two alternate, and medians are compared.
+"""
+
+from __future__ import annotations
+
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from fdm.vehicle import Geodetic, Vehicle
+from fdm.world import World
+from gcs.flight import Flight
+from gcs.lockstep import Lockstep
+from gcs.loop import fly
+from gcs.recording.writer import Recorder, Tap
+from gcs.track import Tracker
+from gcs.truth import Truth
+from scenarios import Scenario, load
+
+REPEATS = 5
+BURST = 25
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Medians over REPEATS."""
+
+    physics_hz: int
+    simulated_s: float
+    bare_s: float
+    """CPU seconds."""
+    loop_s: float
+    unrecorded_s: float
+    """CPU seconds of the loop without a recording."""
+
+    @property
+    def overhead(self) -> float:
+        """Everything but the physics, as a fraction of the physics."""
+        return (self.loop_s - self.bare_s) / self.bare_s
+
+    @property
+    def vehicle_seconds(self) -> float:
+        """Simulated for one CPU second, whole loop."""
+        return 6 * self.simulated_s / self.loop_s
+
+
+def measure(physics_hz: int) -> Cost:
+    """Fly `emergency` under Trust-R."""
+    scenario = load("emergency", overrides=[f"time.physics_hz={physics_hz}"])
+    bare, loop, unrecorded, ticks = [], [], [], 0
+    for _ in range(REPEATS):
+        seconds, ticks = _flight(scenario, recorded=True)
+        loop.append(seconds)
+        bare.append(_bare(scenario, ticks * scenario.time.steps_per_tick))
+        unrecorded.append(_flight(scenario, recorded=False)[0])
+    return Cost(
+        physics_hz,
+        ticks * scenario.time.period_s,
+        statistics.median(bare),
+        statistics.median(loop),
+        statistics.median(unrecorded),
+    )
+
+
+def _flight(scenario: Scenario, *, recorded: bool) -> tuple[float, int]:
+    """(CPU seconds, ticks) of one flight."""
+    flight = Flight(scenario)
+    world = Lockstep(World(scenario, seed=1))
+    truth = Truth(flight.ids)
+    tracker = Tracker(flight, truth)
+    if not recorded:
+        return _timed(lambda: fly(world, world, flight, (truth, tracker), period_ns=scenario.time.period_ns).tick)
+    with tempfile.TemporaryDirectory() as folder:
+        recorder = Recorder(Path(folder) / "run.mcap", scenario, truth, start_ns=world.now(), metadata={})
+
+        def fly_and_close() -> int:
+            with recorder:
+                tap = Tap(world, world, recorder)
+                return fly(tap, world, flight, (truth, tracker, recorder), period_ns=scenario.time.period_ns).tick
+
+        return _timed(fly_and_close)
+
+
+def _bare(scenario: Scenario, steps: int) -> float:
+    """CPU seconds of six vehicles that cruise at height, nothing else."""
+    home = Geodetic(41.15, -81.42, 320.0)
+    vehicles = [Vehicle(home=home, physics_hz=scenario.time.physics_hz, height_m=10.0) for _ in range(6)]
+    for vehicle in vehicles:
+        vehicle.arm()
+        vehicle.set_velocity((1.5, 0.0, 0.0), 0.0)
+
+    def step() -> int:
+        for _ in range(steps // BURST):
+            for vehicle in vehicles:
+                vehicle.step(BURST)
+        return steps
+
+    return _timed(step)[0]
+
+
+def _timed(work: Callable[[], int]) -> tuple[float, int]:
+    start = time.process_time()
+    result = work()
+    return time.process_time() - start, result
+
+
+def main() -> None:
+    """Print a table."""
+    print("flight loop of `emergency`, six vehicles; CPU seconds, median of", REPEATS)
+    print("physics   simulated   bare   loop   of that recording   overhead   vehicle-s per CPU-s")
+    for hz in (250, 200, 100):
+        cost = measure(hz)
+        recording = cost.loop_s - cost.unrecorded_s
+        print(
+            f"{hz:4d} Hz   {cost.simulated_s:7.1f} s  {cost.bare_s:5.3f}  {cost.loop_s:5.3f}   {recording:17.3f}"
+            f"   {cost.overhead:8.2f}   {cost.vehicle_seconds:19.0f}"
+        )
+
+
+if __name__ == "__main__":
+    main()
