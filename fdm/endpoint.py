@@ -33,6 +33,8 @@ MEASUREMENTS = (dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED, dialect.MAVLINK_MSG_I
 
 FORCE_DISARM = 21196
 """param2 of MAV_CMD_COMPONENT_ARM_DISARM that disarms in the air."""
+SKIPS = 0.05
+"""m above the ground, where legs that bounce or scrape count as standing: contacts come and go at low step rates."""
 STANDS_STILL = 1e-9
 """m/s: a horizontal set-point above it asks the vehicle to move."""
 
@@ -139,7 +141,8 @@ class Endpoint:
 
     def _situation(self) -> Situation:
         n, e, d, vn, ve, vd = self.vehicle.position_velocity()
-        return Situation(self.time_s, (n, e, d), (vn, ve, vd), self.vehicle.yaw, self.vehicle.landed)
+        on_ground = self.vehicle.landed or d > -SKIPS
+        return Situation(self.time_s, (n, e, d), (vn, ve, vd), self.vehicle.yaw, on_ground)
 
     def _serve(self, due: list[int]) -> None:
         now = self._situation()
