@@ -35,10 +35,10 @@ def settled(told, *, vehicle=1, seed=1):
     return surroundings, vane
 
 
-def renew(surroundings, vane, from_s, count):
-    """The winds of so many periods."""
+def renew(surroundings, vane, from_s, seconds):
+    """The winds of so many seconds."""
     already = len(vane.winds)
-    for n in range(count):
+    for n in range(round(seconds / PERIOD_S)):
         surroundings.renew(vane, from_s + n * PERIOD_S)
     return vane.winds[already:]
 
@@ -65,17 +65,17 @@ def test_wind_and_turbulence_strike_only_the_vehicles_that_are_named():
 
 def test_before_mission_start_the_air_is_steady_and_sensors_are_exact():
     surroundings, vane = settled(scenario(noise=NOISE))
-    assert renew(surroundings, vane, 0.0, 100) == []
+    assert renew(surroundings, vane, 0.0, 5.0) == []
     assert surroundings.measured(TRUTH, 5.0) == TRUTH
 
 
 def test_gusts_come_on_top_of_the_wind_every_period_from_mission_start():
     surroundings, vane = settled(scenario(noise=NOISE, wind={"speed_m_s": 5, "from_deg": 180}))
     surroundings.begin(vane, 10.0)
-    winds = np.array(renew(surroundings, vane, 10.0, 20_000))
-    assert len(winds) == 20_000
+    winds = np.array(renew(surroundings, vane, 10.0, 1000.0))
+    assert len(winds) == round(1000.0 / PERIOD_S)
     # A first-order process of T = 2 s forgets in 2T: so many independent samples there are in 1000 s.
-    independent = 20_000 * PERIOD_S / (2 * 2.0)
+    independent = 1000.0 / (2 * 2.0)
     assert winds[:, :2].mean(axis=0) == pytest.approx([5.0, 0.0], abs=5 * 0.8 / math.sqrt(independent))
     assert winds[:, :2].std(axis=0) == pytest.approx(0.8, rel=5 / math.sqrt(2 * independent))
     assert not winds[:, 2].any()
@@ -97,7 +97,7 @@ def test_the_same_seed_meets_the_same_air_however_late_the_mission_begins():
         told = scenario(noise=NOISE, swarm={"rows": 1, "columns": 2, "leaders": [1]})
         surroundings, vane = settled(told, seed=seed, vehicle=vehicle)
         surroundings.begin(vane, start_s)
-        winds = renew(surroundings, vane, start_s, 300)
+        winds = renew(surroundings, vane, start_s, 15.0)
         return winds, [surroundings.measured(TRUTH, start_s + k) for k in range(300)]
 
     assert weather(10.0) == weather(73.25)
@@ -113,14 +113,14 @@ def test_the_next_mission_begins_as_the_first_did():
 
     def mission(start_s):
         surroundings.begin(vane, start_s)
-        return renew(surroundings, vane, start_s, 100), surroundings.measured(TRUTH, start_s)
+        return renew(surroundings, vane, start_s, 5.0), surroundings.measured(TRUTH, start_s)
 
     first = mission(10.0)
     surroundings.end(vane)
     assert vane.winds[-1] == steady
     assert vane.rotors[-1] == (1, 1.0, 1.0)
     assert surroundings.measured(TRUTH, 16.0) == TRUTH
-    assert renew(surroundings, vane, 16.0, 100) == []
+    assert renew(surroundings, vane, 16.0, 5.0) == []
     assert mission(50.0) == first
     assert vane.turbulence == [8.0, 0.0, 8.0]
 
@@ -129,11 +129,11 @@ def test_a_rotor_is_told_of_its_health_when_it_changes_and_only_then():
     fault = {"vehicle": 1, "kind": "rotor", "rotor": 3, "efficiency": 0.7, "speed_limit": 0.9, "onset_s": 2, "end_s": 4}
     surroundings, vane = settled(scenario(fault=[fault]))
     surroundings.begin(vane, 10.0)
-    renew(surroundings, vane, 10.0, 39)
+    renew(surroundings, vane, 10.0, 1.9)
     assert vane.rotors == []
-    renew(surroundings, vane, 12.0, 39)
+    renew(surroundings, vane, 12.0, 1.9)
     assert vane.rotors == [(2, 0.7, 0.9)]
-    renew(surroundings, vane, 14.0, 100)
+    renew(surroundings, vane, 14.0, 5.0)
     assert vane.rotors == [(2, 0.7, 0.9), (2, 1.0, 1.0)]
 
 
