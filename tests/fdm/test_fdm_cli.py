@@ -1,0 +1,114 @@
+"""The fdm command as people and scripts run it: a process, its words and its exit code."""
+
+import contextlib
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+from clients import Station
+
+from fdm.cli import app
+
+FDM = [sys.executable, "-c", "from fdm.cli import main; main()"]
+
+
+@contextlib.contextmanager
+def listening():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp:
+        udp.bind(("127.0.0.1", 0))
+        udp.settimeout(4.0)
+        yield udp, f"udpout:127.0.0.1:{udp.getsockname()[1]}"
+
+
+@pytest.fixture
+def run(capsys):
+    """Run a command that must end by itself: (exit code, stdout, stderr)."""
+
+    def run_it(*arguments):
+        with pytest.raises(SystemExit) as ended:
+            sys.exit(app(list(arguments)))
+        return ended.value.code, *capsys.readouterr()
+
+    return run_it
+
+
+@pytest.mark.wall_clock
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_serve_flies_until_it_is_told_to_stop(stop):
+    with listening() as (udp, to):
+        process = subprocess.Popen(
+            [*FDM, "serve", "demo", "--to", to, "--speed", "2"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        try:
+            client, deadline = Station(), time.monotonic() + 4.0
+            while not client.all("HEARTBEAT", system=6) and time.monotonic() < deadline:
+                client.read(udp.recv(2048))
+            assert {message.get_srcSystem() for _, message in client.heard} == {1, 2, 3, 4, 5, 6}
+            process.send_signal(stop)
+            out, words = process.communicate(timeout=4.0)
+        finally:
+            process.kill()
+            process.wait()
+    assert process.returncode == 0
+    assert out == ""
+    assert words.splitlines() == [f"6 vehicles are sending to {to} (shared ports, speed 2); Ctrl-C stops", "stopped"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nope"], ["nope", "demo, emergency, transit"]),
+        (["demo", "--to", "hello"], ["'hello'", "udpout:127.0.0.1:14550"]),
+        (["demo", "--to", "tcp:127.0.0.1:14550"], ["tcp", "udpout"]),
+        (["demo", "--to", "udpout:127.0.0.1:0"], ["ports must be 1 to 65535"]),
+        (["demo", "--to", "udpout:127.0.0.1:14550-14555"], ["one port"]),
+        (["demo", "--to", "udpout:127.0.0.1:65533", "--ports", "separate"], ["65538"]),
+        (["demo", "--to", "udpout:256.0.0.1:14550"], ["256.0.0.1"]),
+        (["demo", "--speed", "0"], ["--speed", "above 0"]),
+        (["demo", "--speed", "-2"], ["--speed", "above 0"]),
+        (["demo", "--speed", "nan"], ["--speed nan"]),
+        (["demo", "--speed", "inf"], ["--speed inf"]),
+        (["demo", "--seed", "-1"], ["--seed -1"]),
+        (["demo", "--set", "swarm.rows=0"], ["swarm.rows = 0"]),
+        (["demo", "--set", "swarm.raws=2"], ["swarm.raws", "did you mean rows?"]),
+        (["demo", "--set", "nonsense"], ["section.key=value"]),
+    ],
+)
+def test_bad_input_is_refused_with_one_sentence_and_code_2(run, arguments, words):
+    code, out, said = run("serve", *arguments)
+    assert (code, out) == (2, "")
+    assert said.startswith("fdm: ")
+    assert len(said.splitlines()) == 1
+    for word in words:
+        assert word in said
+
+
+def test_a_port_in_use_is_refused_with_one_sentence_and_code_2(run):
+    with listening() as (_, to):
+        code, _, said = run("serve", "demo", "--to", to.replace("udpout", "udpin"))
+    assert code == 2
+    assert "in use" in said
+    assert len(said.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["serve"], ["fly"], ["serve", "demo", "--speed", "abc"], ["serve", "demo", "--bogus"], ["serve", "a", "b"]],
+)
+def test_what_is_no_command_ends_with_code_2_and_words(run, arguments):
+    code, out, said = run(*arguments)
+    assert code == 2
+    assert said or out
+
+
+def test_help_names_every_option(run):
+    code, out, _ = run("serve", "--help")
+    assert code == 0
+    for option in ("--to", "--ports", "--speed", "--seed", "--set"):
+        assert option in out

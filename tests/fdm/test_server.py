@@ -1,0 +1,187 @@
+"""A world behind UDP. One thread: the server's turns and the client's reading take turns."""
+
+import contextlib
+import itertools
+import socket
+import time
+
+import pytest
+from clients import ARM, HZ, LOCAL_POSITION, REQUEST, SET_INTERVAL, TAKE_OFF, VERSION, Station, command, scenario
+
+from fdm.server import Server
+from fdm.world import SITE, World
+from wire.connection import Connection, ConnectionRefused
+
+LOOPBACK = "127.0.0.1"
+
+
+def bound(port=0):
+    """A socket that nobody else has."""
+    udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    udp.setblocking(False)
+    udp.bind((LOOPBACK, port))
+    return udp
+
+
+def bound_in_a_row(count):
+    """Sockets on ports that follow each other."""
+    while True:
+        first = bound()
+        row = [first]
+        try:
+            row += [bound(first.getsockname()[1] + place) for place in range(1, count)]
+        except (OSError, OverflowError):
+            for udp in row:
+                udp.close()
+        else:
+            return row
+
+
+class Listener(Station):
+    """A ground station with a socket: answers whoever spoke to it last."""
+
+    def __init__(self, udp):
+        super().__init__()
+        self.udp = udp
+        self.peer = None
+
+    def listen(self):
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                datagram, self.peer = self.udp.recvfrom(2048)
+                self.read(datagram)
+
+    def send(self, *messages):
+        for message in messages:
+            self.udp.sendto(self.pack(message), self.peer)
+
+    def answers(self, **sender):
+        return [(answer.command, answer.result) for answer in self.all("COMMAND_ACK", **sender)]
+
+
+def abreast(count):
+    return World(scenario(swarm={"rows": 1, "columns": count, "leaders": [1]}))
+
+
+@contextlib.contextmanager
+def serving(world, *, ports="shared", speed=1.0):
+    """(server, a listener for each of its ports)."""
+    sockets = bound_in_a_row(len(world.endpoints) if ports == "separate" else 1)
+    to = Connection("udpout", LOOPBACK, sockets[0].getsockname()[1])
+    server = Server(world, to, ports=ports, speed=speed)
+    try:
+        yield server, [Listener(udp) for udp in sockets]
+    finally:
+        server.close()
+        for udp in sockets:
+            udp.close()
+
+
+def turn_until(server, listeners, done, *, limit_s=4.0):
+    """Serve and listen until something is true; it must come true in time."""
+    end = time.monotonic() + limit_s
+    while not done():
+        assert time.monotonic() < end, "it did not happen in time"
+        server.turn()
+        for listener in listeners:
+            listener.listen()
+
+
+@pytest.mark.wall_clock
+def test_a_client_arms_and_takes_off_over_udp():
+    with serving(abreast(1), speed=4.0) as (server, [client]):
+        turn_until(server, [client], lambda: client.all("SYS_STATUS"))
+        client.send(command(SET_INTERVAL, LOCAL_POSITION, 50_000), command(ARM, 1))
+        client.send(command(TAKE_OFF, 0, 0, 0, 0, 0, 0, SITE.altitude_m + 3.0))
+        turn_until(server, [client], lambda: "Take-off height reached" in client.words())
+        assert client.answers() == [(SET_INTERVAL, 0), (ARM, 0), (TAKE_OFF, 0)]
+        assert client.last("LOCAL_POSITION_NED").z == pytest.approx(-3.0, abs=0.4)
+        times = [message.time_boot_ms for message in client.all("LOCAL_POSITION_NED")[1:]]
+        assert {later - earlier for earlier, later in itertools.pairwise(times)} <= {48, 52}
+
+
+@pytest.mark.wall_clock
+def test_shared_vehicles_all_speak_from_one_port_and_hear_what_is_meant_for_them():
+    with serving(abreast(3)) as (server, [client]):
+        turn_until(server, [client], lambda: client.all("HEARTBEAT", system=3))
+        client.send(command(REQUEST, VERSION, system=2))
+        turn_until(server, [client], lambda: client.all("AUTOPILOT_VERSION", system=2))
+        assert not client.all("COMMAND_ACK", system=1)
+        assert not client.all("COMMAND_ACK", system=3)
+        client.send(command(REQUEST, VERSION, system=0))
+        turn_until(server, [client], lambda: client.all("AUTOPILOT_VERSION", system=3))
+        assert [client.last("AUTOPILOT_VERSION", system=system).uid for system in (1, 2, 3)] == [1, 2, 3]
+
+
+@pytest.mark.wall_clock
+def test_separate_vehicles_speak_and_hear_each_on_a_port_of_its_own():
+    with serving(abreast(3), ports="separate") as (server, clients):
+        turn_until(server, clients, lambda: all(client.heard for client in clients))
+        for system, client in enumerate(clients, start=1):
+            assert {message.get_srcSystem() for _, message in client.heard} == {system}
+        clients[1].send(command(ARM, 1, system=2), command(ARM, 1, system=1), command(REQUEST, VERSION, system=0))
+        turn_until(server, clients, lambda: clients[1].all("AUTOPILOT_VERSION", system=2))
+        assert len(clients[1].answers(system=2)) == 2
+        assert not any(clients[place].answers(system=place + 1) for place in (0, 2))
+
+
+@pytest.mark.wall_clock
+@pytest.mark.parametrize("speed", [1.0, 4.0])
+def test_simulated_time_runs_as_many_times_as_fast(speed):
+    with serving(world := abreast(1), speed=speed) as (server, [client]):
+        turn_until(server, [client], lambda: client.heard)
+        before, steps = time.monotonic(), world.steps
+        turn_until(server, [client], lambda: time.monotonic() - before > 1.5)
+        simulated = (world.steps - steps) / HZ
+        assert simulated / (time.monotonic() - before) == pytest.approx(speed, rel=0.2)
+        assert server.behind_s < 0.3
+
+
+@pytest.mark.wall_clock
+def test_garbage_on_the_port_stops_nobody():
+    with serving(abreast(1)) as (server, [client]):
+        turn_until(server, [client], lambda: client.heard)
+        for garbage in (b"", b"\xfd", b"\xfd" * 280, bytes(range(256)) * 5):
+            client.udp.sendto(garbage, client.peer)
+        client.send(command(REQUEST, VERSION))
+        turn_until(server, [client], lambda: client.all("AUTOPILOT_VERSION"))
+
+
+@pytest.mark.wall_clock
+def test_it_sends_on_though_nobody_listens_yet():
+    with serving(world := abreast(1), speed=4.0) as (server, [client]):
+        address = client.udp.getsockname()
+        client.udp.close()
+        while world.steps < 2 * HZ:
+            server.turn()
+        client.udp = bound(address[1])
+        turn_until(server, [client], lambda: client.all("HEARTBEAT"))
+        client.udp.close()
+
+
+@pytest.mark.wall_clock
+def test_on_udpin_it_is_silent_until_spoken_to_and_then_answers_the_speaker():
+    with bound() as free:
+        address = free.getsockname()
+    world = abreast(1)
+    server = Server(world, Connection("udpin", *address), ports="shared", speed=4.0)
+    client = Listener(bound())
+    try:
+        while world.steps < HZ:
+            server.turn()
+        client.listen()
+        assert client.heard == []
+        client.peer = address
+        client.send(command(REQUEST, VERSION))
+        turn_until(server, [client], lambda: client.all("AUTOPILOT_VERSION") and client.all("HEARTBEAT"))
+    finally:
+        server.close()
+        client.udp.close()
+
+
+@pytest.mark.wall_clock
+def test_a_port_in_use_is_refused_in_a_sentence():
+    with bound() as taken:
+        to = Connection("udpin", *taken.getsockname())
+        with pytest.raises(ConnectionRefused, match=f"{to.port}.*in use"):
+            Server(abreast(1), to, ports="shared", speed=1.0)
