@@ -65,8 +65,7 @@ class Failsafe:
     """After it began to hold: then it lands."""
 
 
-@dataclass(frozen=True, slots=True)
-class Setpoint:
+class Setpoint(NamedTuple):
     """A velocity asked for from outside."""
 
     time_s: float

@@ -6,7 +6,7 @@ velocity and a yaw and needs no Python between physics steps. Step it in bursts 
 
 from dataclasses import dataclass
 from math import atan2, cos, degrees, isfinite, radians, sin
-from typing import Final
+from typing import Final, NamedTuple
 
 import jsbsim
 
@@ -43,8 +43,7 @@ class Geodetic:
     altitude_m: float
 
 
-@dataclass(frozen=True, slots=True)
-class VehicleState:
+class VehicleState(NamedTuple):
     """The truth after one physics step."""
 
     time_s: float  # steps × dt since the vehicle was built

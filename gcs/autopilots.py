@@ -12,7 +12,7 @@ import numpy as np
 
 from gcs import messages
 from gcs.commands import Arm, ChangeMode, Command, Land, RequestMessage, RequestStream, TakeOff
-from gcs.telemetry import Swarm
+from gcs.telemetry import Flags, Swarm
 from wire.modes import PX4_MODES
 
 SLOW_S: tuple[tuple[int, float], ...] = (
@@ -66,11 +66,11 @@ class Px4:
     def next_to_obey(self, swarm: Swarm, row: int) -> Command | None:
         """Towards flying our set-points, which must already be coming."""
         offboard = PX4_MODES["offboard"]
-        return None if self.obeys(swarm, row) else ChangeMode(offboard.main, offboard.sub)
+        return None if self.obeying(swarm)[row] else ChangeMode(offboard.main, offboard.sub)
 
-    def obeys(self, swarm: Swarm, row: int) -> bool:
-        """Flies our set-points."""
-        return bool(swarm.custom_mode[row] == PX4_MODES["offboard"].custom_mode)
+    def obeying(self, swarm: Swarm) -> Flags:
+        """(N,) who flies our set-points."""
+        return np.asarray(swarm.custom_mode == PX4_MODES["offboard"].custom_mode)
 
     def next_to_land(self, swarm: Swarm, row: int) -> Command | None:
         """Towards standing on the ground with rotors off."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +52,8 @@ class Land:
     """Come down where you are."""
 
 
-@dataclass(frozen=True, slots=True)
-class SetVelocity:
-    """A velocity set-point."""
+class SetVelocity(NamedTuple):
+    """A velocity set-point: a tuple, because there is one for every vehicle and tick."""
 
     north: float
     east: float

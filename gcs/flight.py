@@ -201,11 +201,10 @@ class Flight:
         return self._ask(state, swarm, lambda row: _some(self._autopilot.next_to_fly(swarm, row)))
 
     def _take_control(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
-        rows = range(len(swarm.ids))
         streaming_s = (state.tick - state.phase_tick) * self._period_s
         height_error = np.abs(swarm.position_ned[:, 2] + self.scenario.swarm.altitude_m)
         hovering = (np.linalg.norm(swarm.velocity_ned, axis=1) < STILL) & (height_error < LEVEL)
-        if streaming_s > STREAM_FIRST_S and all(self._autopilot.obeys(swarm, row) for row in rows) and hovering.all():
+        if streaming_s > STREAM_FIRST_S and self._autopilot.obeying(swarm).all() and hovering.all():
             return self._run_up(_enter(state, Phase.RUN_UP), swarm, now_ns)
         ask: Commands = []
         if streaming_s >= STREAM_FIRST_S:
@@ -236,7 +235,7 @@ class Flight:
         if time_s >= self.plan.read_out_s - 1e-9:
             state = _enter(state, Phase.LAND)
             return self._land(state, swarm, now_ns)
-        obeying = np.array([self._autopilot.obeys(swarm, row) for row in range(len(swarm.ids))])
+        obeying = self._autopilot.obeying(swarm)
         state = self._note_the_lost(state, swarm, obeying, now_ns)
         diagnosis = self._overview(state, swarm)
         heard = obeying & swarm.fresh(now_ns, within_ns=STALE_NS)
@@ -244,7 +243,7 @@ class Flight:
         assert diagnosis.virtual is not None
         decision = decide(observation, diagnosis.virtual, self._settings)
         commanded = obeying & swarm.fresh(now_ns, within_ns=LOST_NS)
-        return self._steer(state, swarm, decision.velocity_ne, replace(diagnosis, decision=decision), commanded)
+        return self._steer(state, swarm, decision.velocity_ne, diagnosis, decision, commanded)
 
     def _land(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
         heard = swarm.fresh(now_ns, within_ns=LOST_NS)
@@ -275,12 +274,14 @@ class Flight:
         swarm: Swarm,
         velocity_ne: Array,
         diagnosis: Diagnosis,
+        decision: Decision | None = None,
         commanded: npt.NDArray[np.bool_] | None = None,
     ) -> Step:
         """Add height and heading, pass the gate, send."""
         height_error = swarm.position_ned[:, 2] + self.scenario.swarm.altitude_m
         down = np.clip(-HEIGHT_GAIN * height_error, -CLIMB_SPEED, CLIMB_SPEED)
-        asked = np.column_stack([velocity_ne, down])
+        asked = np.empty_like(swarm.position_ned)
+        asked[:, :2], asked[:, 2] = velocity_ne, down
         sent, verdict = admit(asked, state.sent_ned, self._limits, dt=self._period_s)
         if commanded is None:
             commanded = np.ones(len(swarm.ids), bool)
@@ -290,7 +291,9 @@ class Flight:
             for system, (north, east, climb), fly in zip(swarm.ids, sent.tolist(), commanded.tolist(), strict=True)
             if fly
         ]
-        diagnosis = replace(diagnosis, asked_ned=asked, sent_ned=sent, verdict=verdict, commanded=commanded)
+        diagnosis = replace(
+            diagnosis, decision=decision, asked_ned=asked, sent_ned=sent, verdict=verdict, commanded=commanded
+        )
         return replace(state, sent_ned=sent), commands, diagnosis
 
     def _overview(self, state: FlightState, swarm: Swarm) -> Diagnosis:
@@ -324,6 +327,8 @@ class Flight:
         if state.problem is not None:
             return state
         silent = ~swarm.fresh(now_ns, within_ns=LOST_NS)
+        if obeying.all() and not silent.any():
+            return state
         when = f"{self._mission_s(state):.1f} s into the mission"
         for row, system in enumerate(swarm.ids):
             if silent[row]:

@@ -42,6 +42,8 @@ def admit(asked_ned: Array, before_ned: Array, limits: Limits, *, dt: float) -> 
 
 def _shorten(vectors: Array, most: float) -> Array:
     """Vectors (N, 3) with their horizontal and vertical parts no longer than `most`."""
+    shorter = vectors.copy()
     horizontal = np.hypot(vectors[:, 0], vectors[:, 1])
-    shorter = np.minimum(1.0, most / np.maximum(horizontal, 1e-12))
-    return np.stack([vectors[:, 0] * shorter, vectors[:, 1] * shorter, np.clip(vectors[:, 2], -most, most)], axis=1)
+    shorter[:, :2] *= np.minimum(1.0, most / np.maximum(horizontal, 1e-12))[:, None]
+    shorter[:, 2] = np.minimum(np.maximum(vectors[:, 2], -most), most)
+    return shorter

@@ -29,8 +29,10 @@ class SwarmFrame:
 
     def to_ne(self, latitude_deg: Array, longitude_deg: Array) -> Array:
         """(N, 2) m north, east of the swarm's origin, of (N,) geodetic places."""
-        degrees = np.stack([latitude_deg - self.latitude_deg, longitude_deg - self.longitude_deg], axis=1)
-        return np.asarray(degrees * self.metres_per_degree - self.origin_ne)
+        ne = np.empty((len(latitude_deg), 2))
+        ne[:, 0] = (latitude_deg - self.latitude_deg) * self.metres_per_degree[0] - self.origin_ne[0]
+        ne[:, 1] = (longitude_deg - self.longitude_deg) * self.metres_per_degree[1] - self.origin_ne[1]
+        return ne
 
 
 def swarm_frame(origin: Array, position_ne: Array, offset_ne: Array, run_up_ne: Array) -> SwarmFrame:

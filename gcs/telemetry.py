@@ -97,7 +97,7 @@ def observe(swarm: Swarm, frames: Iterable[Frame]) -> Swarm:
 
 
 class _Draft:
-    """A swarm being changed. Arrays are copied at the first write to them; positions, the many, are written together."""
+    """A swarm being changed. Arrays are copied at the first write; positions, the many, are written together."""
 
     def __init__(self, swarm: Swarm) -> None:
         self._swarm = swarm

@@ -40,5 +40,7 @@ class Truth:
 
     def position(self, frame: SwarmFrame, swarm: Swarm) -> Array:
         """(N, 3) m: north, east of the swarm's origin, height above each vehicle's home."""
-        ne = frame.to_ne(self._geodetic[:, 0], self._geodetic[:, 1])
-        return np.column_stack([ne, self._geodetic[:, 2] - swarm.origin[:, 2]])
+        position = np.empty_like(self._geodetic)
+        position[:, :2] = frame.to_ne(self._geodetic[:, 0], self._geodetic[:, 1])
+        position[:, 2] = self._geodetic[:, 2] - swarm.origin[:, 2]
+        return position

@@ -45,7 +45,7 @@ RULES: Mapping[str, Rule] = MappingProxyType({"average": average, "trust-r": tru
 
 def weighted_mean(graph: Graph, weights: Array, velocity_ne: Array) -> Array:
     """Eq. 12: u_i = Σ_k w_k v_k over k ∈ {i} ∪ N_i, (N, 2) m/s, from measured velocities (N, 2) m/s."""
-    heard = velocity_ne[graph.sender]
-    return np.stack(
-        [graph.sum_by_receiver(weights * heard[:, 0]), graph.sum_by_receiver(weights * heard[:, 1])], axis=1
-    )
+    mean = np.empty_like(velocity_ne)
+    for axis in range(2):
+        mean[:, axis] = graph.sum_by_receiver(weights * velocity_ne[graph.sender, axis])
+    return mean

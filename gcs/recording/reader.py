@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,6 +14,7 @@ import numpy.typing as npt
 import orjson
 from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader, SeekingReader
+from pydantic import ValidationError
 
 from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
 from gcs.mission import plan
@@ -22,6 +24,10 @@ from scenarios import Scenario
 from wire.frames import Frame, Framer
 
 RECORD_SIZE_LIMIT = 64 << 20
+
+
+DAMAGE = (McapError, StopIteration, struct.error, LookupError, ValueError, TypeError, RuntimeError, OverflowError)
+"""What a torn, flipped or foreign file makes the readers raise: mcap's own, LZ4's, and those of what they hand on."""
 
 
 class UnreadableRecording(ValueError):
@@ -49,18 +55,31 @@ class RecordedTick(NamedTuple):
 
 def read(path: Path) -> Flown:
     """Scenario, metadata and mission of a recording. Raises UnreadableRecording."""
-    try:
-        with path.open("rb") as stream:
-            reader = SeekingReader(stream, record_size_limit=RECORD_SIZE_LIMIT)
-            scenario = next(a.data for a in reader.iter_attachments() if a.name == SCENARIO)
-            metadata = next(m.metadata for m in reader.iter_metadata() if m.name == METADATA)
-            points = list(_points(reader))
-    except (OSError, McapError, StopIteration, struct.error, orjson.JSONDecodeError) as error:
-        raise UnreadableRecording(
-            f"{path}: not a readable recording of a flight: {error or type(error).__name__}"
-        ) from None
-    loaded = Scenario.model_validate_json(scenario)
+    with _readable(path), path.open("rb") as stream:
+        reader = SeekingReader(stream, validate_crcs=True, record_size_limit=RECORD_SIZE_LIMIT)
+        scenario = next((a.data for a in reader.iter_attachments() if a.name == SCENARIO), None)
+        metadata = next((m.metadata for m in reader.iter_metadata() if m.name == METADATA), None)
+        if scenario is None or metadata is None:
+            raise UnreadableRecording(f"{path}: an MCAP file, but no flight of ours: it holds no {SCENARIO}")
+        loaded = Scenario.model_validate_json(scenario)
+        points = list(_points(reader))
     return Flown(path, loaded, metadata, Track.of(points, read_out_s=plan(loaded).read_out_s))
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    """Whatever is wrong with the file becomes one sentence."""
+    try:
+        yield
+    except UnreadableRecording:
+        raise
+    except OSError as error:
+        raise UnreadableRecording(f"{path}: cannot be read: {error.strerror or error}") from None
+    except ValidationError:
+        raise UnreadableRecording(f"{path}: its {SCENARIO} is no scenario of this version") from None
+    except DAMAGE as error:
+        said = " ".join(str(error).split()) or type(error).__name__
+        raise UnreadableRecording(f"{path}: torn, damaged or not an MCAP file: {said}") from None
 
 
 POINTS = ("/mission", "/trust", "/truth/pose", "/swarm/state")
@@ -90,11 +109,11 @@ def _upwards(position_ned: list[list[float | None]]) -> npt.NDArray[np.float64]:
 
 
 def ticks(path: Path) -> Iterator[RecordedTick]:
-    """The frames of a recording as the loop took and sent them, in the order of the file."""
+    """The frames of a recording as the loop took and sent them, in the order of the file. Raises UnreadableRecording."""
     framer, received, sent = Framer(), list[Frame](), list[bytes]()
     own = f"/mavlink/{GROUND_SYSTEM}_{GROUND_COMPONENT}/raw"
-    with path.open("rb") as stream:
-        reader = NonSeekingReader(stream, record_size_limit=RECORD_SIZE_LIMIT)
+    with _readable(path), path.open("rb") as stream:
+        reader = NonSeekingReader(stream, validate_crcs=True, record_size_limit=RECORD_SIZE_LIMIT)
         for _schema, channel, message in reader.iter_messages(log_time_order=False):
             if channel.topic == own:
                 sent.append(message.data)

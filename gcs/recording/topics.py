@@ -8,6 +8,7 @@ from __future__ import annotations
 import inspect
 import re
 from dataclasses import dataclass, fields
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -144,7 +145,8 @@ JSON_TYPES: dict[str, dict[str, Any]] = {
 }
 
 
-def schema(topic: type) -> dict[str, Any]:
+@cache
+def schema(topic: type[Any]) -> dict[str, Any]:
     """The JSON Schema of a topic's class, with its sentences as descriptions."""
     said = _sentences(topic)
     return {

@@ -122,7 +122,8 @@ class Recorder:
 
     def _fleet(self, tick: Tick) -> None:
         swarm = tick.swarm
-        position = np.column_stack([tick.diagnosis.position_ne, swarm.position_ned[:, 2]])
+        position = swarm.position_ned.copy()
+        position[:, :2] = tick.diagnosis.position_ne
         age_s = np.where(swarm.position_ns > 0, (tick.time_ns - swarm.position_ns) / 1e9, np.nan)
         fleet = topics.FleetTopic(tick.number, position, swarm.velocity_ned, age_s)
         self._write(tick.time_ns, "/swarm/state", fleet)
@@ -143,7 +144,7 @@ class Recorder:
     def _write(self, time_ns: int, topic: str, message: Any) -> None:
         channel = self._topics.get(topic)
         if channel is None:
-            kind = type(message)
+            kind: Any = type(message)
             schema = self._writer.register_schema(
                 f"trustr.{kind.__name__.removesuffix('Topic')}",
                 "jsonschema",
