@@ -24,9 +24,7 @@ from scenarios import Scenario
 from wire.frames import Frame, Framer
 
 RECORD_SIZE_LIMIT = 64 << 20
-
-
-DAMAGE = (McapError, StopIteration, struct.error, LookupError, ValueError, TypeError, RuntimeError, OverflowError)
+DAMAGE = (McapError, struct.error, LookupError, ValueError, TypeError, RuntimeError, OverflowError)
 """What a torn, flipped or foreign file makes the readers raise: mcap's own, LZ4's, and those of what they hand on."""
 
 
@@ -109,7 +107,7 @@ def _upwards(position_ned: list[list[float | None]]) -> npt.NDArray[np.float64]:
 
 
 def ticks(path: Path) -> Iterator[RecordedTick]:
-    """The frames of a recording as the loop took and sent them, in the order of the file. Raises UnreadableRecording."""
+    """The frames of a recording as the loop took and sent them, in the file's order. Raises UnreadableRecording."""
     framer, received, sent = Framer(), list[Frame](), list[bytes]()
     own = f"/mavlink/{GROUND_SYSTEM}_{GROUND_COMPONENT}/raw"
     with _readable(path), path.open("rb") as stream:
