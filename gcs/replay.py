@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from gcs.flight import Flight
 from gcs.loop import fly
-from gcs.recording.reader import RecordedTick, read, ticks
+from gcs.recording.reader import RecordedTick, UnreadableRecording, read, ticks
 from wire.frames import Frame
 from wire.payloads import SET_POSITION_TARGET_LOCAL_NED
 
 SETPOINT = SET_POSITION_TARGET_LOCAL_NED.to_bytes(3, "little")
+
+
+class EndOfRecording(Exception):
+    """The flight was cut short: its last recorded tick has been decided again."""
 
 
 class Recorded:
@@ -28,8 +33,10 @@ class Recorded:
         return self._pages[max(self._page, 0)].time_ns
 
     def sleep_until(self, _time_ns: int) -> None:
-        """On to the next tick."""
+        """On to the next tick. Raises EndOfRecording where none is left."""
         self._page += 1
+        if self._page == len(self._pages):
+            raise EndOfRecording
 
     def receive(self) -> list[Frame]:
         """What the flight received at this tick."""
@@ -40,7 +47,7 @@ class Recorded:
         self.sent[self._page].append(frame)
 
     def events(self) -> tuple[str, ...]:
-        """What the operator asked for at this tick; at the end of a torn recording, to stop."""
+        """What the operator asked for at this tick."""
         return self._pages[self._page].events
 
 
@@ -66,8 +73,11 @@ def decide_again(path: Path) -> Verification:
     """Decide a recording again, bit for bit. Raises UnreadableRecording."""
     flight = Flight(read(path).scenario)
     pages = list(ticks(path))
+    if not pages:
+        raise UnreadableRecording(f"{path}: holds no tick to decide again")
     recorded = Recorded(pages)
-    fly(recorded, recorded, flight, (), period_ns=flight.scenario.time.period_ns, events=recorded.events)
+    with suppress(EndOfRecording):
+        fly(recorded, recorded, flight, (), period_ns=flight.scenario.time.period_ns, events=recorded.events)
     difference = next(
         (
             Difference(tick, page.sent, sent)
