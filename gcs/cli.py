@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from collections.abc import Callable
@@ -31,7 +32,7 @@ Yes = Annotated[bool, Parameter(negative=(), help="Do not ask before arming.")]
 
 
 @Parameter(name="*")
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Choices:
     """What a flight is to be, besides its scenario."""
 
@@ -80,6 +81,7 @@ def run(
     def command() -> int:
         from gcs.lockstep import Lockstep
 
+        _check_seed(seed)
         chosen = choices.scenario(scenario)
         world = Lockstep.of(chosen, seed=seed)
         return _fly(scenario, chosen, world, world, seed=seed, out=out, json=json)
@@ -113,8 +115,9 @@ def fly(
         from gcs.live import Live
         from wire.connection import parse
 
-        if speed <= 0:
-            raise BadUsageError(f"--speed {speed}: must be above 0")
+        _check_seed(seed)
+        if not 0.0 < speed < math.inf:
+            raise BadUsageError(f"--speed {speed}: must be a number above 0")
         chosen = choices.scenario(scenario)
         connections = [connection for text in link for connection in parse(text)]
         if arm and not _confirmed(yes):
@@ -154,6 +157,8 @@ def reproduce(
 
         if seeds < 1:
             raise BadUsageError(f"--seeds {seeds}: must be at least 1")
+        if jobs == 0:
+            raise BadUsageError("--jobs 0: must be a number of processes, or -1 for one a core")
         folder = output_folder(out, "reproduce")
         result = fly_all(seeds=seeds, jobs=jobs, console=_stderr())
         result.save(folder)
@@ -243,6 +248,11 @@ def _report(summary: Summary, folder: Path, *, json: bool) -> None:
         console.print(f"picture    {(folder / PICTURE).resolve()}", highlight=False, soft_wrap=True)
 
 
+def _check_seed(seed: int | None) -> None:
+    if seed is not None and seed < 0:
+        raise BadUsageError(f"--seed {seed}: must not be negative")
+
+
 def _confirmed(yes: bool) -> bool:
     """Arming moves rotors: a person types ARM, or a script says --yes."""
     if yes:
@@ -273,12 +283,13 @@ def _guarded(command: Callable[[], int]) -> int:
 
 def _refusals() -> tuple[type[Exception], ...]:
     """What speaks to a person; anything else is a defect and keeps its traceback."""
+    from gcs.compare import UnwritablePicture
     from gcs.recording.reader import UnreadableRecording
     from gcs.recording.writer import RecordingError
     from scenarios import ScenarioError
     from wire.connection import ConnectionRefused
 
-    return BadUsageError, ScenarioError, ConnectionRefused, RecordingError, UnreadableRecording
+    return BadUsageError, ScenarioError, ConnectionRefused, RecordingError, UnreadableRecording, UnwritablePicture
 
 
 def _write(line: bytes) -> None:

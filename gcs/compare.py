@@ -14,10 +14,19 @@ from gcs.scoring import score
 from gcs.session import RECORDING
 
 
+FORMATS = (".png", ".pdf", ".svg")
+
+
+class UnwritablePicture(OSError):
+    """A picture that cannot be written, in one sentence."""
+
+
 def compare(recordings: Sequence[Path], *, picture: Path, console: Any) -> None:
-    """Print a table and draw a picture. Raises UnreadableRecording, and OSError where the picture cannot be written."""
+    """Print a table and draw a picture. Raises UnreadableRecording or UnwritablePicture."""
     if not recordings:
         raise UnreadableRecording("compare: name at least one recording, or the folder of a run")
+    if picture.suffix not in FORMATS:
+        raise UnwritablePicture(f"--out {picture}: must end in {', '.join(FORMATS)}")
     flights = [read(path / RECORDING if path.is_dir() else path) for path in recordings]
     console.print(_table(flights))
     for flight in flights:
@@ -57,4 +66,7 @@ def _draw(flights: Sequence[Flown], picture: Path) -> None:
     ]
     if not panels:
         raise UnreadableRecording("compare: no recording has a mission to draw")
-    draw_side_by_side(panels, picture, heading=flights[0].scenario.title)
+    try:
+        draw_side_by_side(panels, picture, heading=flights[0].scenario.title)
+    except OSError as error:
+        raise UnwritablePicture(f"--out {picture}: cannot be written: {error.strerror or error}") from None
