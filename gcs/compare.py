@@ -13,7 +13,6 @@ from gcs.recording.reader import Flown, UnreadableRecording, read
 from gcs.scoring import score
 from gcs.session import RECORDING
 
-
 FORMATS = (".png", ".pdf", ".svg")
 
 
