@@ -11,7 +11,6 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 Array = npt.NDArray[np.float64]
 
@@ -26,7 +25,7 @@ class Graph:
     count: int
     """Number of robots, N."""
     receiver: npt.NDArray[np.intp]
-    """(E,) row indices, in ascending order."""
+    """(E,) row indices."""
     sender: npt.NDArray[np.intp]
     """(E,) column indices; every robot has one edge to itself."""
     distance: Array
@@ -66,17 +65,21 @@ def neighbours(position_ne: Array, heard: npt.NDArray[np.bool_], *, range_m: flo
 
 
 def _neighbours_by_tree(position: Array, heard: npt.NDArray[np.intp], range_m: float) -> Graph:
+    from scipy.spatial import cKDTree  # a third of a second to import, for swarms that need it
+
     pairs = cKDTree(position[heard]).query_pairs(range_m, output_type="ndarray")
     first, second = heard[pairs[:, 0]], heard[pairs[:, 1]]
-    itself = np.arange(len(position))
-    receiver = np.concatenate([first, second, itself])
-    sender = np.concatenate([second, first, itself])
-    order = np.lexsort((sender, receiver))
-    receiver, sender = receiver[order], sender[order]
-    gap = np.where((receiver == sender)[:, None], 0.0, position[receiver] - position[sender])
-    distance = np.hypot(gap[:, 0], gap[:, 1])
+    north, east = (position[first, axis] - position[second, axis] for axis in range(2))
+    distance = np.hypot(north, east)
     near = distance < range_m  # the tree's bound is inclusive, the paper's is not
-    return Graph(len(position), receiver[near], sender[near], distance[near])
+    first, second, distance = first[near], second[near], distance[near]
+    itself = np.arange(len(position))
+    return Graph(
+        len(position),
+        np.concatenate([itself, first, second]),
+        np.concatenate([itself, second, first]),
+        np.concatenate([np.zeros(len(position)), distance, distance]),
+    )
 
 
 def communication_quality(

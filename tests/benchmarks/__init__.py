@@ -1,1 +1,1 @@
-"""Measurements, one process and one run each: `make bench`. Not tests: machines differ, ratios inside one run do not."""
+"""Measurements, one process and one run each: `make bench`. Machines differ; ratios inside one run hold."""

@@ -1,7 +1,7 @@
 """What the flight loop costs beside the physics it flies.
 
-CPU of a whole lockstep flight with its recording (imports, loading and the picture left out), against a bare loop that steps
-the same six vehicles as many steps in bursts of 25. The two alternate, and medians are compared.
+CPU of a whole lockstep flight with its recording (imports, loading and the picture left out), against a bare loop that
+steps the same six vehicles as many steps in bursts of 25. The two alternate, and medians are compared.
 """
 
 from __future__ import annotations

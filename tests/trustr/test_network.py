@@ -130,7 +130,7 @@ def test_edges_and_distances_are_those_of_the_definition(swarm):
     graph = neighbours(position, heard, range_m=RANGE)
     pairs = list(zip(graph.receiver.tolist(), graph.sender.tolist(), strict=True))
     assert set(pairs) == brute_force(position, heard)
-    assert pairs == sorted(set(pairs))
+    assert len(pairs) == len(set(pairs))
     gaps = np.where((graph.receiver == graph.sender)[:, None], 0, position[graph.receiver] - position[graph.sender])
     assert (graph.distance == np.hypot(gaps[:, 0], gaps[:, 1])).all()
 
@@ -150,10 +150,8 @@ def test_sixty_strangers_out_of_range_change_nothing_among_six():
     six = rng.uniform(0, 30, (6, 2))
     strangers = 1000 + 50 * np.arange(60)[:, None] * np.ones(2)
     alone, among = heard_by_all(six), heard_by_all(np.concatenate([six, strangers]))
-    edges = len(alone.sender)
-    assert len(among.sender) == edges + 60
-    for name in ("receiver", "sender", "distance"):
-        assert (getattr(among, name)[:edges] == getattr(alone, name)).all()
+    assert len(among.sender) == len(alone.sender) + 60
+    assert (among.dense(among.distance)[:6, :6] == alone.dense(alone.distance)).all()
 
 
 @pytest.mark.parametrize("count", [1, 6, DENSE_BELOW])
