@@ -486,6 +486,17 @@ def test_silence_in_flight_stops_lands_and_disarms():
     ]
 
 
+@pytest.mark.parametrize("wait_steps", [0, 3, 7, 12, 20])
+def test_silence_is_noticed_at_the_step_at_which_half_a_second_is_over(wait_steps):
+    flight = Flight().hover().offboard((1.0, 0.0, 0.0), 1.0)
+    flight.endpoint.step(wait_steps)
+    flight.send(setpoint((1.0, 0.0, 0.0)))
+    flight.endpoint.step(124)
+    assert flight.pilot.mode is Mode.OFFBOARD
+    flight.endpoint.step(1)
+    assert flight.pilot.mode is Mode.HOLD
+
+
 @pytest.mark.parametrize(
     "cheapest", [setpoint((math.nan, 0, 0)), setpoint((1, 0, 0), mask=0), command(REQUEST, VERSION)]
 )

@@ -68,12 +68,14 @@ def test_a_fault_strikes_nobody_else():
     assert others.rotors(10.0) == {}
 
 
-def test_of_two_faults_of_one_rotor_the_worse_counts_in_each_respect():
-    faults = of_five(
+@pytest.mark.parametrize("order", [1, -1])
+def test_of_two_faults_of_one_rotor_the_worse_counts_in_each_respect(order):
+    told = [
         rotor(efficiency=0.6, speed_limit=0.9, end_s=10),
         rotor(efficiency=0.8, speed_limit=0.5, onset_s=5),
         rotor(rotor=4, efficiency=0.3, onset_s=8, end_s=9),
-    )
+    ]
+    faults = of_five(*told[::order])
     assert faults.rotors(2.0) == {1: Rotor(0.6, 0.9), 3: HEALTHY}
     assert faults.rotors(8.5) == {1: Rotor(0.6, 0.5), 3: Rotor(0.3, 1.0)}
     assert faults.rotors(20.0) == {1: Rotor(0.8, 0.5), 3: HEALTHY}

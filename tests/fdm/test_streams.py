@@ -66,6 +66,17 @@ def test_nothing_is_faster_than_physics():
     assert schedule.interval_s(1) == pytest.approx(0.004)
 
 
+def test_what_is_due_once_comes_at_its_step_and_never_again():
+    schedule = Schedule(250)
+    schedule.set_interval(2, 0.05, step=0)
+    schedule.once(1, step=20)
+    assert (schedule.has(1), schedule.interval_s(1)) == (True, 0.0)
+    assert due_steps(schedule, 1000) == [20]
+    assert not schedule.has(1)
+    schedule.once(1, step=1017)
+    assert due_steps(schedule, 2000, first=1000) == [1017]
+
+
 def test_a_stop_for_an_unknown_key_is_no_error():
     Schedule(250).set_interval(7, -1.0, step=3)
 
