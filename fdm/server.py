@@ -14,6 +14,8 @@ from wire.frames import Framer, target_system
 
 CATCH_UP_S = 0.25
 """Simulated seconds at one go, at most, when physics has fallen behind."""
+PATIENCE_S = 0.5
+"""Real seconds to wait at one go, at most: whoever stops a slow world must not wait for its next message."""
 
 
 class Server:
@@ -49,7 +51,7 @@ class Server:
     def turn(self) -> None:
         """Wait for a datagram or for something to be due, let physics catch up, deliver, send."""
         due_ns = self._start_ns + self._world.next_event_step * 1_000_000_000 // self._world.physics_hz
-        ready = self._selector.select(self._clock.seconds_until(due_ns))
+        ready = self._selector.select(min(PATIENCE_S, self._clock.seconds_until(due_ns)))
         self._step_to_now()
         for key, _ in ready:
             port: UdpPort = key.fileobj  # type: ignore[assignment]
