@@ -138,6 +138,14 @@ def test_simulated_time_runs_as_many_times_as_fast(speed):
 
 
 @pytest.mark.wall_clock
+def test_a_world_that_hardly_moves_still_comes_back_to_be_told_to_stop():
+    with serving(abreast(1), speed=1e-9) as (server, _):
+        before = time.monotonic()
+        server.turn()
+        assert time.monotonic() - before < 1.0
+
+
+@pytest.mark.wall_clock
 def test_garbage_on_the_port_stops_nobody():
     with serving(abreast(1)) as (server, [client]):
         turn_until(server, [client], lambda: client.heard)
