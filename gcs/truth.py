@@ -22,6 +22,7 @@ class Truth:
     def __init__(self, ids: Sequence[int]) -> None:
         self._rows = {system: row for row, system in enumerate(ids)}
         self._geodetic = np.full((len(ids), 3), np.nan)
+        self._silent = set(self._rows)
         self.velocity_ned = np.full((len(ids), 3), np.nan)
         """(N, 3) m/s."""
 
@@ -32,11 +33,12 @@ class Truth:
                 state, row = unpack_sim_state(frame.payload), self._rows[frame.system]
                 self._geodetic[row] = state.lat_int / 1e7, state.lon_int / 1e7, state.alt
                 self.velocity_ned[row] = state.vn, state.ve, state.vd
+                self._silent.discard(frame.system)
 
     @property
     def known(self) -> bool:
         """Whether every vehicle has told its truth: real ones never do."""
-        return bool(np.isfinite(self._geodetic).all())
+        return not self._silent
 
     def position(self, frame: SwarmFrame, swarm: Swarm) -> Array:
         """(N, 3) m: north, east of the swarm's origin, height above each vehicle's home."""
