@@ -152,6 +152,7 @@ def reproduce(
     """Fly the paper's eight conditions over many seeds, and the recommended profile beside them."""
 
     def command() -> int:
+        from gcs.reproduce import conditions
         from gcs.reproduce import reproduce as fly_all
         from gcs.session import output_folder
 
@@ -160,7 +161,7 @@ def reproduce(
         if jobs == 0:
             raise BadUsageError("--jobs 0: must be a number of processes, or -1 for one a core")
         folder = output_folder(out, "reproduce")
-        result = fly_all(seeds=seeds, jobs=jobs, console=_stderr())
+        result = fly_all(conditions(), seeds=seeds, jobs=jobs, console=_stderr())
         result.save(folder)
         if json:
             _write(result.json())

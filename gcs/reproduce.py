@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import statistics
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -132,9 +133,8 @@ def conditions() -> list[Condition]:
     return listed
 
 
-def reproduce(*, seeds: int, jobs: int, console: Any) -> Reproduction:
-    """Fly every condition with seeds 1 to `seeds`, on `jobs` processes; the result does not depend on their number."""
-    every = conditions()
+def reproduce(every: Sequence[Condition], *, seeds: int, jobs: int, console: Any) -> Reproduction:
+    """Fly these conditions with seeds 1 to `seeds`, on `jobs` processes; the result does not depend on their number."""
     tasks = [(condition, seed) for condition in every for seed in range(1, seeds + 1)]
     results: list[Score] = []
     with _progress(console) as progress:
@@ -194,14 +194,19 @@ def _cells(row: Row) -> tuple[str, ...]:
         row.scenario,
         "none" if row.severity is None else f"{row.severity:.0%}",
         row.controller,
-        f"{heading.mean:.2f}° ± {heading.ci95:.2f}",
+        f"{heading.mean:.2f}°{_plus_minus(heading)}",
         f"{heading.p90:.2f}°",
-        f"{distance.mean:.2f} m ± {distance.ci95:.2f}",
+        f"{distance.mean:.2f} m{_plus_minus(distance)}",
         f"{distance.p90:.2f} m",
         f"{row.pass_rate:.0%}",
         f"{row.min_separation_m:.1f} m",
         "–" if paper is None else f"{paper['heading_error_deg']:g}°, {paper['distance_to_target_m']:g} m",
     )
+
+
+def _plus_minus(spread: Spread) -> str:
+    """One seed has no interval."""
+    return "" if math.isnan(spread.ci95) else f" ± {spread.ci95:.2f}"
 
 
 def _markdown(rows: Iterable[Row]) -> str:
