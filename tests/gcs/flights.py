@@ -1,0 +1,169 @@
+"""Flights that tests share, each flown once a process, and how many: TRUSTR_PROFILE=soak flies what the issue names."""
+
+import atexit
+import hashlib
+import os
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from mcap.reader import NonSeekingReader
+from mcap.writer import Writer
+
+from gcs.flight import Flight
+from gcs.lockstep import Lockstep
+from gcs.loop import fly
+from gcs.operator import Operator
+from gcs.recording.reader import Flown, read
+from gcs.session import flown
+from gcs.summary import Summary
+from scenarios import Scenario, load
+
+SOAK = os.environ.get("TRUSTR_PROFILE") == "soak"
+SEEDS = range(1, 31 if SOAK else 2)
+"""Of each of the paper's conditions."""
+REPETITIONS = 5 if SOAK else 1
+"""Of the flight over UDP."""
+
+GCS = Path(sys.executable).with_name("gcs")
+FDM = Path(sys.executable).with_name("fdm")
+
+_scratch = tempfile.TemporaryDirectory(prefix="trustr-flights-")
+atexit.register(_scratch.cleanup)
+
+
+class Counting:
+    """A link that keeps every frame that passes through it, whichever way."""
+
+    def __init__(self, link):
+        self._link = link
+        self.received, self.sent = [], []
+
+    def receive(self):
+        frames = self._link.receive()
+        self.received += frames
+        return frames
+
+    def send(self, system, frame):
+        self.sent.append((system, frame))
+        self._link.send(system, frame)
+
+
+class Severed:
+    """A link that loses one vehicle, both ways, so many seconds after it was made."""
+
+    def __init__(self, link, clock, *, system, from_s):
+        self._link, self._clock, self._system = link, clock, system
+        self._from_ns = clock.now() + round(from_s * 1e9)
+
+    def receive(self):
+        return [frame for frame in self._link.receive() if not self._lost(frame.system, frame.time_ns)]
+
+    def send(self, system, frame):
+        if not self._lost(system, self._clock.now()):
+            self._link.send(system, frame)
+
+    def _lost(self, system, time_ns):
+        return system == self._system and time_ns >= self._from_ns
+
+
+@dataclass(frozen=True)
+class Recorded:
+    """A flight in lockstep and all that it left behind."""
+
+    scenario: Scenario
+    summary: Summary
+    folder: Path
+    link: Counting
+
+    @property
+    def path(self) -> Path:
+        return self.folder / "run.mcap"
+
+    def read(self) -> Flown:
+        return read(self.path)
+
+
+@cache
+def recorded(name, *overrides, seed=1):
+    """One lockstep flight as `gcs run` flies it."""
+    return fly_and_record(name, *overrides, seed=seed)
+
+
+def fly_and_record(name, *overrides, seed=1, through=None, watching=lambda _flight: ()):
+    """The same, not shared. through: wraps (link, clock)."""
+    scenario = load(name, overrides=overrides)
+    folder = scratch()
+    world = Lockstep.of(scenario, seed=seed)
+    link = Counting(world if through is None else through(world, world))
+    with Operator(print) as operator:
+        summary = flown(name, scenario, link, world, seed=seed, out=folder, operator=operator, watching=watching)
+    return Recorded(scenario, summary, folder, link)
+
+
+def sent_by(known, *, world, seed=1):
+    """Every frame that a ground station which knows one scenario sends to the vehicles of another."""
+    vehicles = Lockstep.of(world, seed=seed)
+    link = Counting(vehicles)
+    fly(link, vehicles, Flight(known), (), period_ns=known.time.period_ns)
+    return link.sent
+
+
+def scratch() -> Path:
+    """A new folder that goes away with the process."""
+    return Path(tempfile.mkdtemp(dir=_scratch.name))
+
+
+def start(*words, **options):
+    """A command of ours in a process of its own, its output kept."""
+    return subprocess.Popen(
+        [str(word) for word in words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options
+    )
+
+
+def messages(path):
+    """(topic, log time, payload) of every message, in the order of the file."""
+    with path.open("rb") as stream:
+        reader = NonSeekingReader(stream, validate_crcs=True)
+        return [(c.topic, m.log_time, m.data) for _, c, m in reader.iter_messages(log_time_order=False)]
+
+
+def digest(path):
+    """A hash over topics, times and payloads."""
+    hashed = hashlib.sha256()
+    for topic, time_ns, data in messages(path):
+        hashed.update(b"%s %d %d " % (topic.encode(), time_ns, len(data)) + data)
+    return hashed.hexdigest()
+
+
+def rewritten(path, change):
+    """A copy of a recording, message by message.
+
+    change: (place in the file, topic, log time, payload) → payload, or None to leave the message out.
+    """
+    copy = scratch() / "rewritten.mcap"
+    with path.open("rb") as stream, copy.open("wb") as target:
+        reader = NonSeekingReader(stream)
+        writer = Writer(target)
+        writer.start(library="test")
+        channels = {}
+        for place, (schema, channel, message) in enumerate(reader.iter_messages(log_time_order=False)):
+            if channel.id not in channels:
+                schema_id = 0 if schema is None else writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.id] = writer.register_channel(channel.topic, channel.message_encoding, schema_id)
+            data = change(place, channel.topic, message.log_time, message.data)
+            if data is not None:
+                writer.add_message(channels[channel.id], message.log_time, data, message.publish_time)
+        stream.seek(0)
+        for attachment in NonSeekingReader(stream).iter_attachments():
+            writer.add_attachment(
+                attachment.create_time, attachment.log_time, attachment.name, attachment.media_type, attachment.data
+            )
+        stream.seek(0)
+        for metadata in NonSeekingReader(stream).iter_metadata():
+            writer.add_metadata(metadata.name, metadata.metadata)
+        writer.finish()
+    return copy
