@@ -97,14 +97,10 @@ def test_names_of_robots_do_not_matter(profile, observation, random):
 @given(observations(), st.floats(-np.pi, np.pi))
 def test_turning_the_world_turns_the_commands(profile, observation, angle):
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    chosen = SETTINGS[profile]
-    known = (
-        observation.heard & np.isfinite(observation.position_ne).all(1) & np.isfinite(observation.velocity_ne).all(1)
-    )
-    position, velocity = (
-        np.where(known[:, None], value, 0.0) for value in (observation.position_ne, observation.velocity_ne)
-    )
-    seen = replace(observation, position_ne=position, velocity_ne=velocity, heard=known)
+    # one range for all, and no separation: rounding must not decide who is just inside a radius, or on which side
+    chosen = replace(SETTINGS[profile], range_m=1e6, best_range_m=1e5, separation_gain=0.0)
+    position, velocity = (np.nan_to_num(value) for value in (observation.position_ne, observation.velocity_ne))
+    seen = replace(observation, position_ne=position.clip(-40, 40), velocity_ne=velocity.clip(-3, 3))
     turned = decide(
         replace(seen, position_ne=seen.position_ne @ turn, velocity_ne=seen.velocity_ne @ turn),
         VirtualLeader(VIRTUAL.position_ne @ turn, VIRTUAL.velocity_ne @ turn, VIRTUAL.acceleration_ne @ turn),
