@@ -68,9 +68,8 @@ def serve(
 
     signal.signal(signal.SIGINT, stop)
     signal.signal(signal.SIGTERM, stop)
-    _say(
-        f"{loaded.swarm.count} vehicles are sending to {connections[0]} ({ports} ports, speed {speed:g}); Ctrl-C stops"
-    )
+    where = f"send to {connections[0]}" if connections[0].kind == "udpout" else f"wait at {connections[0]}"
+    _say(f"{loaded.swarm.count} vehicles {where} ({ports} ports, speed {speed:g}); Ctrl-C stops")
     warned = False
     while not stopped:
         server.turn()
@@ -94,4 +93,7 @@ def _say(words: str) -> None:
 
 def main() -> None:
     """Entry point."""
-    sys.exit(app())
+    try:
+        sys.exit(app())
+    except KeyboardInterrupt:
+        sys.exit(130)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any, Final
 
 from pymavlink.dialects.v20 import common as dialect
@@ -77,6 +76,7 @@ class Endpoint:
         for message, rate_hz in personality.streams_hz.items():
             self._schedule.set_interval(message, 1.0 / rate_hz, step=0)
         self._pilot = Pilot()
+        self._known, self._known_step = self._look(), 0
         self._measured: tuple[float, ...] = vehicle.position_velocity()
         self._measured_step = 0
         self._commands: dict[int, Callable[[Any], int]] = {
@@ -140,6 +140,12 @@ class Endpoint:
         self._outbox.append((self.vehicle.steps, frame))
 
     def _situation(self) -> Situation:
+        """Where the vehicle is now; a set-point that comes at a step just served finds it known."""
+        if self._known_step != self.vehicle.steps:
+            self._known, self._known_step = self._look(), self.vehicle.steps
+        return self._known
+
+    def _look(self) -> Situation:
         n, e, d, vn, ve, vd = self.vehicle.position_velocity()
         on_ground = self.vehicle.landed or d > -SKIPS
         return Situation(self.time_s, (n, e, d), (vn, ve, vd), self.vehicle.yaw, on_ground)
@@ -183,7 +189,7 @@ class Endpoint:
             velocity = self._surroundings.flown(velocity, now.time_s)
         yaw = modes.heading(pilot, dt)
         if yaw != pilot.yaw:
-            self._pilot = replace(pilot, yaw=yaw)
+            self._pilot = pilot._replace(yaw=yaw)
         self.vehicle.set_velocity(velocity, yaw)
 
     def _position_target(self, target: PositionTarget) -> None:

@@ -15,7 +15,7 @@ https://docs.px4.io/main/en/advanced_config/parameter_reference.html
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
@@ -33,6 +33,7 @@ STOPPED = 0.3  # m/s: below it, the place to hold is taken
 REACHED = 0.2  # m: take-off is over
 DEFAULT_TAKEOFF_HEIGHT = 2.5  # m, MIS_TAKEOFF_ALT
 LANDED_FOR = 0.5  # s on the ground, then disarm
+DISARM_LANDED = 2.0  # s, COM_DISARM_LAND: on the ground again, whatever the mode
 IDLE_DISARM = 10.0  # s, COM_DISARM_PRFLT: armed but never taken off
 READY_AFTER = 1.0  # s after boot until sensors have settled
 PRESS_DOWN = 1.0  # m/s downwards asked for on the ground, so that rotors idle
@@ -87,9 +88,8 @@ class Situation(NamedTuple):
     on_ground: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Pilot:
-    """State of the machine."""
+class Pilot(NamedTuple):
+    """State of the machine; a tuple, because every set-point makes a new one."""
 
     armed: bool = False
     mode: Mode = Mode.HOLD
@@ -125,10 +125,7 @@ def arm(pilot: Pilot, now: Situation) -> Outcome:
         return Outcome(pilot)
     if now.time_s < READY_AFTER:
         return _refuse(pilot, "Arming denied: sensors are settling")
-    armed = replace(
-        pilot, armed=True, mode=Mode.HOLD, anchor_ned=None, yaw=now.yaw, land_at_s=None,
-        grounded_since_s=now.time_s, airborne=False,
-    )  # fmt: skip
+    armed = Pilot(armed=True, setpoint=pilot.setpoint, yaw=now.yaw, grounded_since_s=now.time_s)
     return Outcome(armed, words=((Severity.INFO, "Armed by external command"),))
 
 
@@ -136,7 +133,7 @@ def disarm(pilot: Pilot, now: Situation, *, force: bool) -> Outcome:
     """Stop the rotors; in the air only by force."""
     if pilot.armed and not now.on_ground and not force:
         return _refuse(pilot, "Disarming denied: not landed")
-    return Outcome(replace(pilot, armed=False, mode=Mode.HOLD, land_at_s=None))
+    return Outcome(pilot._replace(armed=False, mode=Mode.HOLD, land_at_s=None))
 
 
 def take_off(pilot: Pilot, now: Situation, height: float) -> Outcome:
@@ -147,7 +144,7 @@ def take_off(pilot: Pilot, now: Situation, height: float) -> Outcome:
         return _refuse(pilot, "Take-off denied: altitude is below home")
     north, east, _ = now.position_ned
     return Outcome(
-        replace(pilot, mode=Mode.TAKEOFF, anchor_ned=(north, east, -height), land_at_s=None),
+        pilot._replace(mode=Mode.TAKEOFF, anchor_ned=(north, east, -height), land_at_s=None),
         words=((Severity.INFO, f"Takeoff to {height:.1f} meters above home"),),
     )
 
@@ -157,13 +154,13 @@ def set_mode(pilot: Pilot, now: Situation, mode: Mode, failsafe: Failsafe) -> Ou
     if mode is Mode.OFFBOARD and not hears_setpoints(pilot, now, failsafe):
         return _refuse(pilot, "Offboard denied: no set-points are coming")
     if mode is pilot.mode:
-        return Outcome(replace(pilot, land_at_s=None))
-    return Outcome(replace(pilot, mode=mode, anchor_ned=None, land_at_s=None))
+        return Outcome(pilot._replace(land_at_s=None))
+    return Outcome(pilot._replace(mode=mode, anchor_ned=None, land_at_s=None))
 
 
 def hear(pilot: Pilot, setpoint: Setpoint) -> Pilot:
     """Take note of a set-point; OFFBOARD flies it."""
-    return replace(pilot, setpoint=setpoint)
+    return pilot._replace(setpoint=setpoint)
 
 
 def hears_setpoints(pilot: Pilot, now: Situation, failsafe: Failsafe) -> bool:
@@ -179,17 +176,18 @@ def advance(pilot: Pilot, now: Situation, failsafe: Failsafe) -> Outcome:
     pilot = _watch_the_ground(pilot, now)
     grounded_s = 0.0 if pilot.grounded_since_s is None else now.time_s - pilot.grounded_since_s
     if pilot.mode is Mode.LAND and grounded_s >= LANDED_FOR:
-        return Outcome(replace(pilot, armed=False), words=((Severity.INFO, "Landed, disarmed"),))
-    if pilot.mode is Mode.HOLD and not pilot.airborne and grounded_s >= IDLE_DISARM:
-        return Outcome(replace(pilot, armed=False), words=((Severity.INFO, "Disarmed: no take-off"),))
+        return Outcome(pilot._replace(armed=False), words=((Severity.INFO, "Landed, disarmed"),))
+    if pilot.mode is Mode.HOLD and grounded_s >= (DISARM_LANDED if pilot.airborne else IDLE_DISARM):
+        why = "Landed, disarmed" if pilot.airborne else "Disarmed: no take-off"
+        return Outcome(pilot._replace(armed=False), words=((Severity.INFO, why),))
     if pilot.mode is Mode.TAKEOFF and pilot.anchor_ned is not None:
         if abs(now.position_ned[2] - pilot.anchor_ned[2]) < REACHED:
-            return Outcome(replace(pilot, mode=Mode.HOLD), words=((Severity.INFO, "Take-off height reached"),))
+            return Outcome(pilot._replace(mode=Mode.HOLD), words=((Severity.INFO, "Take-off height reached"),))
     elif pilot.mode is Mode.OFFBOARD and not hears_setpoints(pilot, now, failsafe):
-        lost = replace(pilot, mode=Mode.HOLD, anchor_ned=None, land_at_s=now.time_s + failsafe.land_after_s)
+        lost = pilot._replace(mode=Mode.HOLD, anchor_ned=None, land_at_s=now.time_s + failsafe.land_after_s)
         return Outcome(lost, words=((Severity.CRITICAL, "Set-points lost: holding"),))
     elif pilot.land_at_s is not None and now.time_s >= pilot.land_at_s:
-        landing = replace(pilot, mode=Mode.LAND, anchor_ned=None, land_at_s=None)
+        landing = pilot._replace(mode=Mode.LAND, anchor_ned=None, land_at_s=None)
         return Outcome(landing, words=((Severity.CRITICAL, "Set-points did not come back: landing"),))
     return Outcome(_anchored(pilot, now))
 
@@ -219,10 +217,9 @@ def heading(pilot: Pilot, dt: float) -> float:
 
 def _watch_the_ground(pilot: Pilot, now: Situation) -> Pilot:
     if not now.on_ground:
-        return pilot if pilot.airborne and pilot.grounded_since_s is None else replace(
-            pilot, airborne=True, grounded_since_s=None
-        )  # fmt: skip
-    return pilot if pilot.grounded_since_s is not None else replace(pilot, grounded_since_s=now.time_s)
+        flying = pilot.airborne and pilot.grounded_since_s is None
+        return pilot if flying else pilot._replace(airborne=True, grounded_since_s=None)
+    return pilot if pilot.grounded_since_s is not None else pilot._replace(grounded_since_s=now.time_s)
 
 
 def _anchored(pilot: Pilot, now: Situation) -> Pilot:
@@ -231,7 +228,7 @@ def _anchored(pilot: Pilot, now: Situation) -> Pilot:
         return pilot
     north, east, down = now.velocity_ned
     speed = math.hypot(north, east, 0.0 if pilot.mode is Mode.LAND else down)
-    return replace(pilot, anchor_ned=now.position_ned) if speed < STOPPED else pilot
+    return pilot._replace(anchor_ned=now.position_ned) if speed < STOPPED else pilot
 
 
 def _flyable(velocity_ned: Vector) -> Vector:

@@ -9,7 +9,7 @@ from typing import Literal
 
 from fdm.world import World
 from wire.clock import WallClock
-from wire.connection import Address, Connection, UdpPort
+from wire.connection import Address, Connection, ConnectionRefused, UdpPort
 from wire.frames import Framer, target_system
 
 CATCH_UP_S = 0.25
@@ -37,7 +37,13 @@ class Server:
             shared = UdpPort(to)
             self._port_of = [shared] * count
         else:
-            self._port_of = [UdpPort(replace(to, port=to.port + place)) for place in range(count)]
+            self._port_of = []
+            for place in range(count):
+                try:
+                    self._port_of.append(UdpPort(replace(to, port=to.port + place)))
+                except ConnectionRefused:
+                    self.close()
+                    raise
         for port in dict.fromkeys(self._port_of):
             self._selector.register(port, selectors.EVENT_READ)
         self.behind_s = 0.0

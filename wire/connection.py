@@ -92,7 +92,7 @@ class UdpPort:
                 self._socket.send(data)
             else:
                 self._socket.sendto(data, to)
-        except (BlockingIOError, ConnectionRefusedError):
+        except OSError:  # nobody listens there, no network, a full buffer: the link is as good as its next datagram
             return False
         return True
 

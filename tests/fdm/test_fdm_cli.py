@@ -57,7 +57,7 @@ def test_serve_flies_until_it_is_told_to_stop(stop):
             process.wait()
     assert process.returncode == 0
     assert out == ""
-    assert words.splitlines() == [f"6 vehicles are sending to {to} (shared ports, speed 2); Ctrl-C stops", "stopped"]
+    assert words.splitlines() == [f"6 vehicles send to {to} (shared ports, speed 2); Ctrl-C stops", "stopped"]
 
 
 @pytest.mark.parametrize(

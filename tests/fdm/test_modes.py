@@ -1,7 +1,6 @@
 """The mode machine without a vehicle: situations in, modes and velocities out."""
 
 import math
-from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -293,7 +292,7 @@ def test_offboard_keeps_the_heading_asked_for_or_its_own(setpoint, expected):
 def test_a_yaw_rate_turns_round_and_round():
     pilot = flying(Mode.OFFBOARD, yaw=3.0, setpoint=Setpoint(20.0, NORTHWARDS, yaw_rate=0.5))
     for _ in range(200):
-        pilot = replace(pilot, yaw=modes.heading(pilot, PERIOD))
+        pilot = pilot._replace(yaw=modes.heading(pilot, PERIOD))
     assert pilot.yaw == pytest.approx(math.remainder(3.0 + 0.5 * 10.0, math.tau))
 
 
