@@ -59,6 +59,10 @@ class Phase(Enum):
     DONE = "done"
 
 
+BEFORE_MISSION = (Phase.CLIMB, Phase.TAKE_CONTROL, Phase.RUN_UP)
+"""In the air already: without one of them the mission cannot begin, so all come down."""
+
+
 @dataclass(frozen=True, slots=True)
 class Asked:
     """What one vehicle was last asked for, and when."""
@@ -156,14 +160,14 @@ class Flight:
         """One tick. events: what an operator asked for since the last; "land" ends the flight."""
         if "land" in events and state.phase not in (Phase.LAND, Phase.DONE):
             state = _enter(state, Phase.LAND)
-        state = self._watch(state)
+        state = self._watch(state, swarm, now_ns)
         state, commands, diagnosis = self._phases[state.phase](state, swarm, now_ns)
         if state.tick % self.scenario.time.ticks(1.0) == 0:
             commands = [(system, Beat()) for system in self.ids] + commands
         return replace(state, tick=state.tick + 1), commands, diagnosis
 
-    def _watch(self, state: FlightState) -> FlightState:
-        """Give up what takes too long."""
+    def _watch(self, state: FlightState, swarm: Swarm, now_ns: int) -> FlightState:
+        """Give up what takes too long, and a fleet that loses a vehicle before its mission."""
         timeout_s = self.scenario.time.timeout_s
         in_phase_s = (state.tick - state.phase_tick) * self._period_s
         if state.phase is Phase.LAND:
@@ -171,6 +175,10 @@ class Flight:
                 return _failed(state, f"not every vehicle landed within {LANDING_S:g} s", Phase.DONE)
         elif state.tick * self._period_s > timeout_s and state.phase is not Phase.DONE:
             return _failed(state, f"the flight took longer than time.timeout_s = {timeout_s:g} s", Phase.LAND)
+        elif state.phase in BEFORE_MISSION:
+            silent = ~swarm.fresh(now_ns, within_ns=LOST_NS)
+            if silent.any():
+                return _failed(state, _fell_silent(swarm, silent, state.phase), Phase.LAND)
         return state
 
     def _join(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
@@ -248,7 +256,9 @@ class Flight:
     def _land(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
         heard = swarm.fresh(now_ns, within_ns=LOST_NS)
         if not (swarm.armed & heard).any() and state.phase is not Phase.DONE:
-            state = _enter(state, Phase.DONE)
+            unseen = swarm.armed & ~heard
+            problem = _fell_silent(swarm, unseen, state.phase) if unseen.any() else None
+            state = replace(_enter(state, Phase.DONE), problem=state.problem or problem)
         return self._ask(
             state,
             swarm,
@@ -354,6 +364,11 @@ def _enter(state: FlightState, phase: Phase) -> FlightState:
 
 def _failed(state: FlightState, problem: str, phase: Phase) -> FlightState:
     return replace(_enter(state, phase), problem=state.problem or problem)
+
+
+def _fell_silent(swarm: Swarm, silent: npt.NDArray[np.bool_], phase: Phase) -> str:
+    names = ", ".join(str(system) for system, mute in zip(swarm.ids, silent, strict=True) if mute)
+    return f"vehicle {names} fell silent while {phase.value}"
 
 
 def _some(command: Command | None) -> tuple[Command, ...]:
