@@ -15,7 +15,8 @@ import aircraft as models
 FOOT: Final = 0.3048  # m
 EARTH_RATE: Final = 7.292115e-5  # rad/s, WGS-84
 ROTORS: Final = 4
-TOP_SPEED: Final = 50.0  # m/s, more than the aircraft reaches in a dive with its motors running
+CLEARANCE: Final = 0.5  # m, more than any contact point lies below the centre of mass
+STEEPEST: Final = 40.0  # m/s², gravity and full thrust of an overturned vehicle, 3.3 g together, and some more
 
 _INTEGRATORS: Final = (
     "north-correction",
@@ -197,7 +198,9 @@ class Vehicle:
 
     def _watch_ground(self, n: int) -> None:
         """Switch contacts off where `n` steps cannot reach the ground: they cost a fifth of a step."""
-        reach = 1.0 + TOP_SPEED * n / self._physics_hz
+        seconds = n / self._physics_hz
+        sinking = max(0.0, self._velocity[2].get_double_value() * FOOT)
+        reach = CLEARANCE + (sinking + 0.5 * STEEPEST * seconds) * seconds
         enabled = self._height.get_double_value() * FOOT < reach
         if enabled != self._ground_enabled:
             self._ground_enabled = enabled
