@@ -88,16 +88,18 @@ def _flight(scenario: Scenario, *, recorded: bool) -> tuple[float, int]:
 
 
 def _bare(scenario: Scenario, steps: int) -> float:
-    """CPU seconds of six vehicles that cruise at height, nothing else."""
+    """CPU seconds of six vehicles that climb, cruise and come down as the flight does, and of nothing else."""
     home = Geodetic(41.15, -81.42, 320.0)
-    vehicles = [Vehicle(home=home, physics_hz=scenario.time.physics_hz, height_m=10.0) for _ in range(6)]
+    hz = scenario.time.physics_hz
+    vehicles = [Vehicle(home=home, physics_hz=hz) for _ in range(6)]
     for vehicle in vehicles:
         vehicle.arm()
-        vehicle.set_velocity((1.5, 0.0, 0.0), 0.0)
 
     def step() -> int:
-        for _ in range(steps // BURST):
+        for start in range(0, steps, BURST):
+            down = -1.5 if start < 6.7 * hz else 0.0 if steps - start > 9.5 * hz else 1.0
             for vehicle in vehicles:
+                vehicle.set_velocity((1.5 if down == 0.0 else 0.0, 0.0, down), 0.0)
                 vehicle.step(BURST)
         return steps
 
