@@ -90,7 +90,7 @@ def test_a_swarm_that_is_always_beside_the_leader_has_distance_and_no_heading_er
 
 
 def test_the_failed_robot_counts_for_the_swarm_and_not_for_the_healthy():
-    track = moved(ideal(TRANSIT), (0.0, -60.0), robots=4, since_s=10.0)
+    track = moved(moved(ideal(TRANSIT), (0.0, -9.0), robots=4), (0.0, -60.0), robots=4, since_s=10.0)
     result = score(track, TRANSIT)
     assert result.heading_error_deg == pytest.approx(0, abs=1e-9)
     assert result.distance_to_target_m == pytest.approx(0, abs=1e-9)
