@@ -8,6 +8,7 @@ from types import TracebackType
 
 from rich.console import Console, Group
 from rich.live import Live
+from rich.padding import Padding
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
@@ -64,14 +65,14 @@ class Display:
             head.append(f" · {diagnosis.task}")
         flown = 0.0 if math.isnan(diagnosis.mission_s) else diagnosis.mission_s
         bar = ProgressBar(total=self._flight.plan.read_out_s, completed=flown, width=72)
-        return Group(head, bar, self._table(tick))
+        return Group(head, Padding(bar, (0, 0, 1, 0)), self._table(tick))
 
     def _table(self, tick: Tick) -> Table:
-        table = Table(box=None, padding=(0, 2), header_style="dim")
+        table = Table(box=None, padding=(0, 1), header_style="dim")
         for column in ("UAV", "role", "mode"):
             table.add_column(column)
         for column in ("north", "east", "height", "speed", "battery", "link age", "trust"):
-            table.add_column(column, justify="right")
+            table.add_column(column, justify="right", no_wrap=True)
         swarm, diagnosis = tick.swarm, tick.diagnosis
         leaders = self._flight.scenario.swarm.leaders
         for row, system in enumerate(swarm.ids[:MOST_ROWS]):
@@ -114,4 +115,4 @@ def _number(value: float, unit: str) -> str:
 
 def _trust_bar(trust: float) -> Text:
     style = "green" if trust >= 0.5 else "red"
-    return Text.assemble(("█" * round(trust * 8)).rjust(8, "·"), f" {trust:.2f}", style=style)
+    return Text(f"{'█' * round(trust * 5):·>5} {trust:.2f}", style=style)
