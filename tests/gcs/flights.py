@@ -93,10 +93,10 @@ def recorded(name, *overrides, seed=1):
     return fly_and_record(name, *overrides, seed=seed)
 
 
-def fly_and_record(name, *overrides, seed=1, through=None, watching=lambda _flight: ()):
+def fly_and_record(name, *overrides, seed=1, through=None, out=None, watching=lambda _flight: ()):
     """The same, not shared. through: wraps (link, clock)."""
     scenario = load(name, overrides=overrides)
-    folder = scratch()
+    folder = scratch() if out is None else out
     world = Lockstep.of(scenario, seed=seed)
     link = Counting(world if through is None else through(world, world))
     with Operator(print) as operator:

@@ -1,0 +1,271 @@
+"""What a recording holds, that it is MCAP as anybody reads it, and that nothing which happens leaves it torn."""
+
+from collections import Counter
+from dataclasses import fields
+from io import BytesIO
+from itertools import pairwise
+
+import numpy as np
+import orjson
+import pytest
+from flights import fly_and_record, messages, recorded
+from mcap.exceptions import EndOfFile
+from mcap.reader import NonSeekingReader, SeekingReader
+from mcap.records import Chunk, Footer
+from mcap.stream_reader import StreamReader
+
+from gcs.recording import topics
+from gcs.recording.reader import UnreadableRecording, read
+from gcs.scoring import score
+from scenarios import Scenario
+from wire.frames import Framer
+
+SYSTEMS = range(1, 7)
+OURS = {"/tick", "/mission", "/trust", "/weights", "/setpoint", "/swarm/state", "/truth/pose", "/truth/fault"}
+RAW = {f"/mavlink/{system}_{component}/raw" for system in SYSTEMS for component in (1, 200)}
+GROUND = "/mavlink/255_190/raw"
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return recorded("emergency")
+
+
+@pytest.fixture(scope="module")
+def held(flight):
+    """(topic, log time, payload), in the order of the file."""
+    return messages(flight.path)
+
+
+def contents(held, topic):
+    return [orjson.loads(data) for name, _, data in held if name == topic]
+
+
+def test_its_topics_are_those_of_the_contract(held):
+    expected = OURS | RAW | {GROUND} | {f"/uav/{system}/state" for system in SYSTEMS}
+    assert {topic for topic, _, _ in held} == expected
+
+
+def test_every_frame_that_came_is_in_it_under_its_sender_and_its_time(flight, held):
+    came = [(f"/mavlink/{f.system}_{f.component}/raw", f.time_ns, f.raw) for f in flight.link.received]
+    assert [message for message in held if message[0] in RAW] == came
+    assert len(came) > 5000
+
+
+def test_every_frame_that_went_is_in_it(flight, held):
+    went = [data for topic, _, data in held if topic == GROUND]
+    assert went == [frame for _, frame in flight.link.sent]
+    (beats, setpoints) = (Counter(frame[7] for frame in went)[message] for message in (0, 84))
+    assert beats == 6 * -(-len(contents(held, "/tick")) // 10)
+    assert setpoints > 1900
+
+
+def test_a_set_point_names_its_vehicle(flight, held):
+    framer = Framer()
+    targets = [framer.frames(0, data)[0].payload[-3] for topic, _, data in held if topic == GROUND and data[7] == 84]
+    assert targets == [system for system, frame in flight.link.sent if frame[7] == 84]
+
+
+def test_the_raw_frames_between_two_ticks_are_what_the_second_consumed(held):
+    since = 0
+    for topic, _, data in held:
+        if topic in RAW:
+            since += 1
+        elif topic == "/tick":
+            assert orjson.loads(data)["frames"] == since
+            since = 0
+
+
+def test_ticks_are_numbered_without_a_gap_and_their_times_are_periods_apart(held):
+    times = [time_ns for topic, time_ns, _ in held if topic == "/tick"]
+    ticks = contents(held, "/tick")
+    assert [tick["number"] for tick in ticks] == list(range(len(ticks)))
+    assert {later - earlier for earlier, later in pairwise(times)} == {100_000_000}
+    assert {tick["lateness_ns"] for tick in ticks} == {0}
+    assert list(dict.fromkeys(tick["phase"] for tick in ticks)) == [
+        "joining", "taking off", "taking control", "running up", "mission", "landing", "done",
+    ]  # fmt: skip
+
+
+def test_a_fault_is_told_when_it_begins(held):
+    (fault,) = contents(held, "/truth/fault")
+    assert (fault["vehicle"], fault["active"], fault["mission_s"]) == (5, True, 0.0)
+    assert fault["definition"]["max_speed_fraction"] == 0.4
+
+
+def test_weights_are_rows_that_sum_to_one_and_hardly_heed_the_distrusted(held):
+    for content in contents(held, "/weights"):
+        weights = np.array(content["weights"])
+        assert (weights >= 0).all()
+        assert weights.sum(axis=1) == pytest.approx(1.0, abs=1e-12)
+    assert contents(held, "/trust")[0]["trust"] == [1, 1, 1, 1, 0, 1]
+
+
+def test_a_number_that_is_none_is_null(held):
+    (first, last) = (contents(held, "/swarm/state")[place] for place in (0, -1))
+    assert first["position_m"] == [[None] * 3] * 6
+    assert first["age_s"] == [None] * 6
+    assert np.isfinite(last["position_m"]).all()
+    assert not any(b"NaN" in data for topic, _, data in held if topic in OURS)
+
+
+def test_every_message_of_ours_is_what_its_schema_says(flight):
+    checked = set()
+    with flight.path.open("rb") as stream:
+        for schema, channel, message in SeekingReader(stream).iter_messages():
+            if channel.message_encoding == "json":
+                assert schema.encoding == "jsonschema"
+                check(orjson.loads(message.data), orjson.loads(schema.data))
+                checked.add(channel.topic.split("/")[1])
+            else:
+                assert channel.message_encoding == "mavlink"
+                assert schema is None
+    assert checked == {"tick", "mission", "trust", "weights", "setpoint", "swarm", "uav", "truth"}
+
+
+KINDS = {
+    "integer": lambda v: isinstance(v, int) and not isinstance(v, bool),
+    "number": lambda v: isinstance(v, (int, float)) and not isinstance(v, bool),
+    "null": lambda v: v is None,
+    "string": lambda v: isinstance(v, str),
+    "boolean": lambda v: isinstance(v, bool),
+    "array": lambda v: isinstance(v, list),
+    "object": lambda v: isinstance(v, dict),
+}
+
+
+def check(value, schema):
+    """The part of JSON Schema that we write, and no key that it does not name."""
+    kinds = schema["type"] if isinstance(schema["type"], list) else [schema["type"]]
+    assert any(KINDS[kind](value) for kind in kinds), (value, schema)
+    if "properties" in schema:
+        assert value.keys() == schema["properties"].keys() == set(schema["required"])
+        for key, below in schema["properties"].items():
+            check(value[key], below)
+    for item in value if isinstance(value, list) else ():
+        check(item, schema["items"])
+
+
+@pytest.mark.parametrize(
+    "topic", [kind for name, kind in vars(topics).items() if name.endswith("Topic")], ids=lambda kind: kind.__name__
+)
+def test_a_schema_has_a_type_for_every_field_and_a_sentence_for_the_whole(topic):
+    schema = topics.schema(topic)
+    assert schema["properties"].keys() == {field.name for field in fields(topic)}
+    assert schema["description"].startswith("/")
+    assert not [key for key, below in schema["properties"].items() if "type" not in below]
+
+
+def test_the_scenario_in_it_is_the_scenario_flown(flight):
+    assert flight.read().scenario == flight.scenario
+    with flight.path.open("rb") as stream:
+        (attachment,) = NonSeekingReader(stream).iter_attachments()
+    assert (attachment.name, attachment.media_type) == ("scenario.json", "application/json")
+    assert Scenario.model_validate_json(attachment.data) == flight.scenario
+
+
+def test_versions_seed_and_summary_are_metadata(flight):
+    with flight.path.open("rb") as stream:
+        metadata = {record.name: record.metadata for record in SeekingReader(stream).iter_metadata()}
+    assert metadata["trustr"]["seed"] == "1"
+    assert metadata["trustr"].keys() >= {"started", "python", "trustr", "jsbsim", "pymavlink", "numpy", "mcap"}
+    assert orjson.loads(metadata["summary"]["json"]) == orjson.loads((flight.folder / "summary.json").read_bytes())
+
+
+def test_the_summary_of_the_file_counts_all_that_is_in_it(flight, held):
+    with flight.path.open("rb") as stream:
+        summary = SeekingReader(stream, validate_crcs=True).get_summary()
+    assert summary.statistics.message_count == len(held)
+    counted = {summary.channels[number].topic: n for number, n in summary.statistics.channel_message_counts.items()}
+    assert counted == Counter(topic for topic, _, _ in held)
+
+
+def test_a_mission_read_back_is_scored_as_the_flight_was(flight):
+    again = score(flight.read().track, flight.scenario)
+    assert again.heading_error_deg == pytest.approx(flight.summary.heading_error_deg, abs=1e-9)
+    assert again.distance_to_target_m == pytest.approx(flight.summary.distance_to_target_m, abs=1e-9)
+    assert again.min_separation_m == pytest.approx(flight.summary.min_separation_m, abs=1e-9)
+    assert again.passed is flight.summary.passed is True
+
+
+def records(data):
+    return list(StreamReader(BytesIO(data), emit_chunks=True).records)
+
+
+def test_no_chunk_holds_back_more_than_a_tenth_of_a_second(flight):
+    chunks = [record for record in records(flight.path.read_bytes()) if isinstance(record, Chunk)]
+    assert max(chunk.message_end_time - chunk.message_start_time for chunk in chunks) <= 100_000_000
+    assert max(later.message_end_time - earlier.message_end_time for earlier, later in pairwise(chunks)) <= 100_000_000
+
+
+class Peek:
+    """A record that keeps what another process would find on the disk at one tick, or stops there as a defect would."""
+
+    def __init__(self, path, tick, *, then=None):
+        self._path, self._tick, self._then = path, tick, then
+        self.on_disk = None
+
+    def tick(self, tick):
+        if tick.number == self._tick:
+            self.on_disk = self._path.read_bytes()
+            if self._then is not None:
+                raise self._then
+
+
+def test_a_process_killed_at_any_time_leaves_all_but_the_last_tick_on_the_disk(tmp_path):
+    peek = Peek(tmp_path / "run.mcap", 40)
+    fly_and_record("demo", "time.timeout_s=5", out=tmp_path, watching=lambda _flight: (peek,))
+    found = NonSeekingReader(BytesIO(peek.on_disk)).iter_messages(log_time_order=False)
+    numbers = []
+    with pytest.raises(EndOfFile):
+        numbers.extend(orjson.loads(m.data)["number"] for _, channel, m in found if channel.topic == "/tick")
+    assert numbers == list(range(len(numbers)))
+    assert numbers[-1] >= 39
+
+
+@pytest.mark.parametrize("error", [RuntimeError("a defect"), KeyboardInterrupt(), OSError("disk")], ids=repr)
+def test_whatever_ends_a_flight_its_recording_is_whole(error, tmp_path):
+    path = tmp_path / "run.mcap"
+    with pytest.raises(type(error)):
+        fly_and_record("demo", out=tmp_path, watching=lambda _flight: (Peek(path, 30, then=error),))
+    assert isinstance(records(path.read_bytes())[-1], Footer)
+    assert read(path).track is None
+    assert [content["number"] for content in contents(messages(path), "/tick")] == list(range(31))
+
+
+def torn(data):
+    return [data[:size] for size in (0, 1, 8, 9, 100, 1000, len(data) // 2, len(data) - 9, len(data) - 1)]
+
+
+def flipped(data):
+    rng = np.random.default_rng(2)
+    for place in rng.integers(len(data), size=120):
+        wrong = bytearray(data)
+        wrong[place] ^= 1 << int(rng.integers(8))
+        yield bytes(wrong)
+
+
+@pytest.fixture(scope="module")
+def small():
+    """A recording of a few seconds: taken off, timed out, landed."""
+    return fly_and_record("demo", "time.timeout_s=3", "swarm.rows=1", "swarm.columns=2", "swarm.leaders=[1]")
+
+
+def test_a_file_cut_short_anywhere_is_refused_in_a_sentence(small, tmp_path):
+    for data in torn(small.path.read_bytes()):
+        (tmp_path / "torn.mcap").write_bytes(data)
+        with pytest.raises(UnreadableRecording, match=r"^\S*torn\.mcap: ") as refusal:
+            read(tmp_path / "torn.mcap")
+        assert "\n" not in str(refusal.value)
+
+
+def test_a_flipped_bit_is_refused_or_harmless_but_never_a_crash(small, tmp_path):
+    path = tmp_path / "flipped.mcap"
+    refused = 0  # the rest hit what is not read: paddings, indices, frames of the wire
+    for data in flipped(small.path.read_bytes()):
+        path.write_bytes(data)
+        try:
+            assert read(path).scenario == small.scenario
+        except UnreadableRecording:
+            refused += 1
+    assert refused > 30
