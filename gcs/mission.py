@@ -8,7 +8,8 @@ the new leg instead of jumping to it. `docs/recommended-profile.md` has the figu
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -38,8 +39,6 @@ class Segment:
     begins_s: float
     """Since mission start."""
     ends_s: float
-    announced: bool
-    """Known before it began; False for an emergency."""
     planned_end_ne: Array
     """(2,) m: where it would have gone had nothing interrupted it."""
 
@@ -51,9 +50,12 @@ class Segment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plan:
-    """The whole path, events included."""
+    """The whole path, events included, and what was known of it when."""
 
     segments: tuple[Segment, ...]
+    """As flown."""
+    known: tuple[tuple[Segment, ...], ...]
+    """What lay ahead at mission start, then what lay ahead after each event, uncut by events still to come."""
 
     @property
     def hand_over_s(self) -> float:
@@ -72,39 +74,40 @@ class Plan:
 
     def segment_at(self, time_s: float) -> Segment:
         """The segment being flown; before the first it is the first, after the last the last."""
-        current = self.segments[0]
-        for segment in self.segments:
-            if segment.begins_s <= time_s + 1e-9:
-                current = segment
-        return current
+        return _at(self.segments, time_s)
 
 
 def plan(scenario: Scenario) -> Plan:
     """The path of a scenario, from the swarm's origin."""
     cruise = scenario.mission.cruise_m_s
-    pending: list[Leg | Redirect] = list(scenario.mission.leg)
-    events = list(scenario.event)
-    start, flown, segments = np.zeros(2), 0.0, []
-    while pending:
-        leg = pending.pop(0)
-        along, length = np.array(direction(leg.heading_deg)), leg.length_m
-        planned_end = start + along * length
-        if events and events[0].at_length_m < flown + length:
-            length = events[0].at_length_m - flown
-            pending = [events.pop(0)]
-        segments.append(
-            Segment(
-                task=leg.task,
-                start_ne=start,
-                velocity_ne=along * cruise,
-                begins_s=flown / cruise,
-                ends_s=(flown + length) / cruise,
-                announced=isinstance(leg, Leg),
-                planned_end_ne=planned_end,
-            )
-        )
-        start, flown = start + along * length, flown + length
-    return Plan(tuple(segments))
+    ahead = _straight(scenario.mission.leg, np.zeros(2), 0.0, cruise)
+    flown, known = list[Segment](), [ahead]
+    for event in scenario.event:
+        call_s = event.at_length_m / cruise
+        cut = [replace(leg, ends_s=min(leg.ends_s, call_s)) for leg in ahead if leg.begins_s < call_s - 1e-9]
+        flown += cut
+        ahead = _straight([event], cut[-1].end_ne, call_s, cruise)
+        known.append(ahead)
+    return Plan((*flown, *ahead), tuple(known))
+
+
+def _straight(legs: Sequence[Leg | Redirect], start_ne: Array, begins_s: float, cruise: float) -> tuple[Segment, ...]:
+    """Legs one after another, each beginning where the one before it ends."""
+    segments = []
+    for leg in legs:
+        along = np.array(direction(leg.heading_deg))
+        ends_s, end_ne = begins_s + leg.length_m / cruise, start_ne + along * leg.length_m
+        segments.append(Segment(leg.task, start_ne, along * cruise, begins_s, ends_s, end_ne))
+        start_ne, begins_s = end_ne, ends_s
+    return tuple(segments)
+
+
+def _at(segments: Sequence[Segment], time_s: float) -> Segment:
+    current = segments[0]
+    for segment in segments:
+        if segment.begins_s <= time_s + 1e-9:
+            current = segment
+    return current
 
 
 def run_up(cruise: float, duration_s: float, time_s: float) -> tuple[float, float]:
@@ -117,22 +120,51 @@ def run_up(cruise: float, duration_s: float, time_s: float) -> tuple[float, floa
 
 def paper_leader(plan: Plan, time_s: float) -> VirtualLeader:
     """Along the legs at cruise speed; turns on the spot, stops at once."""
-    segment = plan.segment_at(time_s)
-    if time_s >= plan.segments[-1].ends_s:
-        return VirtualLeader(plan.target_ne, np.zeros(2), np.zeros(2))
+    return _on_the_legs(plan.segments, time_s)
+
+
+def recommended_leader(plan: Plan, time_s: float) -> VirtualLeader:
+    """Rounds and brakes by what is known at the time, and swings onto what nobody could know."""
+    called = sum(ahead[0].begins_s <= time_s + 1e-9 for ahead in plan.known[1:])
+    return _after_calls(plan, called, time_s)
+
+
+PROFILES = {"paper": paper_leader, "recommended": recommended_leader}
+
+
+def _on_the_legs(segments: Sequence[Segment], time_s: float) -> VirtualLeader:
+    last = segments[-1]
+    if time_s >= last.ends_s:
+        return VirtualLeader(last.end_ne, np.zeros(2), np.zeros(2))
+    segment = _at(segments, time_s)
     at = segment.start_ne + segment.velocity_ne * (time_s - segment.begins_s)
     return VirtualLeader(at, segment.velocity_ne, np.zeros(2))
 
 
-def recommended_leader(plan: Plan, time_s: float) -> VirtualLeader:
-    """Rounds what it can foresee, swings onto what it cannot."""
-    for before, after in zip(plan.segments, (*plan.segments[1:], None), strict=True):
-        turn_s = _turn_s(before, after)
+def _after_calls(plan: Plan, called: int, time_s: float) -> VirtualLeader:
+    """The virtual leader after so many emergency calls: its new leg, and what is left of how it came there."""
+    smooth = _rounded(plan.known[called], time_s)
+    if called == 0:
+        return smooth
+    leg = plan.known[called][0]
+    call_s, span_s = leg.begins_s, min(SWING_S, leg.ends_s - leg.begins_s + 0.5 * TURN_S)
+    came, begun = _after_calls(plan, called - 1, call_s), _rounded(plan.known[called], call_s)
+    offset, rate = came.position_ne - begun.position_ne, came.velocity_ne - begun.velocity_ne
+    left = _fading(offset, rate, time_s - call_s, span_s)
+    return VirtualLeader(
+        smooth.position_ne + left.position_ne,
+        smooth.velocity_ne + left.velocity_ne,
+        smooth.acceleration_ne + left.acceleration_ne,
+    )
+
+
+def _rounded(segments: tuple[Segment, ...], time_s: float) -> VirtualLeader:
+    """Along the legs, each change of velocity spread over TURN_S: half before the corner, half behind it."""
+    for before, after in zip(segments, (*segments[1:], None), strict=True):
+        legs = [before] if after is None else [before, after]
+        turn_s = min(TURN_S, *(leg.ends_s - leg.begins_s for leg in legs))
         since = time_s - before.ends_s
-        if after is not None and not after.announced:
-            if 0.0 <= since < min(SWING_S, after.ends_s - after.begins_s):
-                return _swinging(before, after, since)
-        elif abs(since) < 0.5 * turn_s:
+        if abs(since) < 0.5 * turn_s:
             change = (np.zeros(2) if after is None else after.velocity_ne) - before.velocity_ne
             into = since + 0.5 * turn_s
             return VirtualLeader(
@@ -140,25 +172,16 @@ def recommended_leader(plan: Plan, time_s: float) -> VirtualLeader:
                 before.velocity_ne + change * into / turn_s,
                 change / turn_s,
             )
-    return paper_leader(plan, time_s)
+    return _on_the_legs(segments, time_s)
 
 
-def _turn_s(before: Segment, after: Segment | None) -> float:
-    """Half of a turn lies on each side of the corner, and must fit there."""
-    legs = [before] if after is None else [before, after]
-    return min(TURN_S, *(leg.ends_s - leg.begins_s for leg in legs))
-
-
-def _swinging(before: Segment, after: Segment, since: float) -> VirtualLeader:
-    """From the old velocity onto the new leg: a cubic offset whose rate begins as their difference and ends at zero."""
-    span = min(SWING_S, after.ends_s - after.begins_s)
-    part = since / span
-    difference = before.velocity_ne - after.velocity_ne
+def _fading(offset: Array, rate: Array, since: float, span: float) -> VirtualLeader:
+    """An offset [m] and its rate [m/s] that are both gone after `span` seconds: the cubic between (Hermite)."""
+    if since >= span:
+        return VirtualLeader(np.zeros(2), np.zeros(2), np.zeros(2))
+    s = since / span
     return VirtualLeader(
-        after.start_ne + after.velocity_ne * since + difference * since * (1.0 - part) ** 2,
-        after.velocity_ne + difference * (1.0 - part) * (1.0 - 3.0 * part),
-        difference * (6.0 * part - 4.0) / span,
+        offset * (1.0 + s * s * (2.0 * s - 3.0)) + rate * span * s * (1.0 - s) ** 2,
+        offset * 6.0 * s * (s - 1.0) / span + rate * (1.0 - s) * (1.0 - 3.0 * s),
+        (offset * (12.0 * s - 6.0) / span + rate * (6.0 * s - 4.0)) / span,
     )
-
-
-PROFILES = {"paper": paper_leader, "recommended": recommended_leader}

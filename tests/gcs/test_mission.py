@@ -45,8 +45,10 @@ def test_segments_join_without_a_gap_in_place_or_time(name):
 
 
 def test_an_emergency_cuts_its_leg_short_and_begins_where_the_leader_is():
-    inspection, accident = plan(load("emergency")).segments
-    assert (inspection.announced, accident.announced) == (True, False)
+    path = plan(load("emergency"))
+    inspection, accident = path.segments
+    assert [[leg.task for leg in ahead] for ahead in path.known] == [[inspection.task], [accident.task]]
+    assert path.known[0][0].end_ne == pytest.approx(along(60, 30))
     assert inspection.end_ne == pytest.approx(along(60, 9))
     assert inspection.planned_end_ne == pytest.approx(along(60, 30))
     assert accident.planned_end_ne == pytest.approx(accident.end_ne)
@@ -104,15 +106,16 @@ def test_the_papers_leader_runs_at_cruise_turns_on_the_spot_and_stops_at_once(ti
 
 @st.composite
 def missions(draw):
-    """Plans whose unforeseen legs are long enough to swing onto and to brake on."""
+    """Plans of one to four legs, most with an emergency call at any moment, a corner's included."""
     heading = st.floats(-180, 180)
     cruise = draw(st.sampled_from([0.5, 1.0, 1.5, 3.0]))
     lengths = [cruise * seconds for seconds in draw(st.lists(st.floats(0.5, 20), min_size=1, max_size=4))]
     legs = ", ".join(f'{{task="leg", heading_deg={draw(heading)}, length_m={length}}}' for length in lengths)
     event = ""
     if draw(st.booleans()):
-        at = sum(lengths[:-1]) + draw(st.floats(0.3, 0.9)) * lengths[-1]
-        length = (SWING_S + TURN_S + draw(st.floats(0, 10))) * cruise
+        at = draw(st.floats(0.01, 0.99).map(lambda part: part * sum(lengths)) | st.sampled_from(lengths))
+        at = min(at, 0.999 * sum(lengths))
+        length = draw(st.floats(0.2, 15)) * cruise
         event = f'{{kind="redirect", at_length_m={at}, task="call", heading_deg={draw(heading)}, length_m={length}}}'
     text = f'title = "any"\nevent = [{event}]\n[mission]\ncruise_m_s = {cruise}\nleg = [{legs}]'
     return plan(parse(text, source="any"))
@@ -153,9 +156,10 @@ def test_its_velocity_and_acceleration_are_the_derivatives_of_its_place(name):
 @given(missions(), st.floats(0, 1))
 def test_away_from_corners_it_is_the_papers(path, part):
     time_s = part * path.read_out_s
-    for segment in path.segments:
-        after = SWING_S if not segment.announced else TURN_S / 2
-        if segment.begins_s + after < time_s < segment.ends_s - TURN_S / 2 or time_s < path.segments[0].ends_s - TURN_S:
+    calls = [ahead[0].begins_s for ahead in path.known[1:]]
+    swinging = any(call <= time_s <= call + SWING_S for call in calls)
+    for segment in path.known[sum(call <= time_s for call in calls)]:
+        if segment.begins_s + TURN_S / 2 < time_s < segment.ends_s - TURN_S / 2 and not swinging:
             ours, papers = recommended_leader(path, time_s), paper_leader(path, time_s)
             assert (ours.position_ne == papers.position_ne).all()
             assert (ours.velocity_ne == papers.velocity_ne).all()
@@ -176,11 +180,12 @@ def test_it_is_never_faster_than_cruise_at_a_foreseen_corner_and_never_far_from_
     time_s = part * path.read_out_s
     cruise = np.linalg.norm(path.segments[0].velocity_ne)
     leader = recommended_leader(path, time_s)
-    if all(segment.announced for segment in path.segments):
+    if len(path.known) == 1:
         assert np.linalg.norm(leader.velocity_ne) <= cruise * (1 + 1e-9)
-    # a parabola leaves its corner by Δv T/8, a swing by Δv T 4/27; Δv ≤ 2 cruise
+    # a parabola leaves its corner by Δv T/8, a swing by Δv T 4/27 and by where it began; Δv ≤ 2 cruise
     away = np.linalg.norm(leader.position_ne - paper_leader(path, time_s).position_ne)
-    assert away <= 2 * cruise * max(TURN_S / 8, SWING_S * 4 / 27) * (1 + 1e-9)
+    swung = TURN_S / 8 + SWING_S * 4 / 27 if len(path.known) > 1 else 0.0
+    assert away <= 2 * cruise * (TURN_S / 8 + swung) * (1 + 1e-9)
 
 
 def test_a_corner_is_rounded_by_a_parabola_that_passes_an_eighth_of_the_turn_inside():
@@ -192,9 +197,13 @@ def test_a_corner_is_rounded_by_a_parabola_that_passes_an_eighth_of_the_turn_ins
     assert leader.acceleration_ne == pytest.approx(change / TURN_S)
 
 
-def test_until_an_emergency_call_it_flies_as_if_there_were_none():
-    quiet, called = plan(load("emergency", overrides=["event=[]"])), plan(load("emergency"))
-    for time_s in np.arange(0, called.hand_over_s, 0.1):
+@pytest.mark.parametrize(
+    ("name", "at_length_m"), [("emergency", 9), ("emergency", 29.5), ("demo", 12), ("demo", 12.6), ("demo", 26.5)]
+)
+def test_until_an_emergency_call_it_flies_as_if_there_were_none(name, at_length_m):
+    call = f'event=[{{kind="redirect", at_length_m={at_length_m}, task="call", heading_deg=180, length_m=9}}]'
+    quiet, called = plan(load(name, overrides=["event=[]"])), plan(load(name, overrides=[call]))
+    for time_s in np.arange(0, called.hand_over_s - 1e-6, 0.1):
         assert (recommended_leader(quiet, time_s).position_ne == recommended_leader(called, time_s).position_ne).all()
 
 
