@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -16,7 +17,6 @@ from mcap.writer import Writer
 from gcs.flight import Flight
 from gcs.lockstep import Lockstep
 from gcs.loop import fly
-from gcs.operator import Operator
 from gcs.recording.reader import Flown, read
 from gcs.session import flown
 from gcs.summary import Summary
@@ -71,6 +71,13 @@ class Severed:
 
 
 @dataclass(frozen=True)
+class Saying:
+    """An operator without a keyboard."""
+
+    events: Callable[[], tuple[str, ...]]
+
+
+@dataclass(frozen=True)
 class Recorded:
     """A flight in lockstep and all that it left behind."""
 
@@ -93,14 +100,14 @@ def recorded(name, *overrides, seed=1):
     return fly_and_record(name, *overrides, seed=seed)
 
 
-def fly_and_record(name, *overrides, seed=1, through=None, out=None, watching=lambda _flight: ()):
-    """The same, not shared. through: wraps (link, clock)."""
+def fly_and_record(name, *overrides, seed=1, through=None, out=None, events=tuple, watching=lambda _flight: ()):
+    """The same, not shared. through: wraps (link, clock);  events: what an operator says at each tick."""
     scenario = load(name, overrides=overrides)
     folder = scratch() if out is None else out
     world = Lockstep.of(scenario, seed=seed)
     link = Counting(world if through is None else through(world, world))
-    with Operator(print) as operator:
-        summary = flown(name, scenario, link, world, seed=seed, out=folder, operator=operator, watching=watching)
+    operator = Saying(events)
+    summary = flown(name, scenario, link, world, seed=seed, out=folder, operator=operator, watching=watching)
     return Recorded(scenario, summary, folder, link)
 
 
