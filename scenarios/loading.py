@@ -75,7 +75,9 @@ def explain(error: ValidationError, tables: dict[str, Any]) -> list[str]:
 
 
 def _clause(problem: Any, tables: dict[str, Any]) -> str:
-    location = [part for part in problem["loc"] if part not in _TAGS]
+    location = list(problem["loc"])
+    if location[:1] == ["fault"] and len(location) > 2:
+        del location[2]  # pydantic puts the kind of a union's member into the path; people did not type it
     key = ".".join(map(str, location))
     if problem["type"] == "extra_forbidden":
         allowed = _allowed_keys(tables, location[:-1])
@@ -89,43 +91,32 @@ def _clause(problem: Any, tables: dict[str, Any]) -> str:
         context = problem["ctx"]
         return f"{key}.kind = {context['tag']!r}: allowed are {context['expected_tags']}"
     message = str(problem["msg"]).removeprefix("Value error, ").replace("Input should be", "must be")
-    message = re.sub(r"a valid dictionary or instance of \w+", "a section of keys", message)
+    message = re.sub(
+        r"a valid dictionary or (instance of \w+|object to extract fields from)", "a section of keys", message
+    )
+    message = message.replace("a valid tuple", "a list")
     if problem["type"] == "value_error":
         return f"{key}: {message}" if key else message
     return f"{key} = {problem['input']!r}: {message}"
 
 
-_TAGS = (
-    "motor_degradation",
-    "rotor",
-)  # pydantic puts the tag of a union into the path; people did not type it
-
-
 def _allowed_keys(tables: dict[str, Any], location: Sequence[Any]) -> list[str]:
     """Keys of the model at this place of the file."""
-    model: type[BaseModel] = Scenario
+    models: list[type[BaseModel]] = [Scenario]
     value: Any = tables
     for part in location:
         value = value[part]
-        if isinstance(part, int):
-            continue
-        model = _model_of(model.model_fields[part].annotation, value)
-    if isinstance(value, dict) and "kind" in value:
-        model = _model_of(model, value)
-    return list(model.model_fields)
+        if isinstance(part, str):
+            models = list(_models_in(models[0].model_fields[part].annotation))
+        elif isinstance(value, dict):
+            models = [model for model in models if _is_of_kind(model, value.get("kind"))] or models
+    return list(models[0].model_fields)
 
 
-def _model_of(annotation: Any, value: Any) -> type[BaseModel]:
-    """The section a field holds; of a union, the one whose kind the value names."""
-    candidates = list(_models_in(annotation))
-    kind = value.get("kind") if isinstance(value, dict) else None
-    if isinstance(value, list) and value and isinstance(value[-1], dict):
-        kind = value[-1].get("kind")
-    for candidate in candidates:
-        field = candidate.model_fields.get("kind")
-        if field is not None and kind in getattr(field.annotation, "__args__", ()):
-            return candidate
-    return candidates[0]
+def _is_of_kind(model: type[BaseModel], kind: Any) -> bool:
+    """Whether a member of a union is the one that a table's kind names."""
+    field = model.model_fields.get("kind")
+    return field is not None and kind in getattr(field.annotation, "__args__", ())
 
 
 def _models_in(annotation: Any) -> Iterable[type[BaseModel]]:

@@ -188,6 +188,12 @@ class Control(Section):
     response_time_s: Positive = 0.47
     """Mean lag of the vehicles' answer to a velocity step, ∫ (1 − v/v_step) dt; `recommended` scales with it."""
 
+    @model_validator(mode="after")
+    def _somebody_counts(self) -> Control:
+        if self.weights == "literal" and self.eta == 0.0:
+            raise ValueError('eta = 0 with weights = "literal": nobody would be heard; it must be above 0')
+        return self
+
 
 class Network(Section):
     """Who hears whom, eq. 13."""
@@ -238,7 +244,7 @@ class Wind(Section):
     speed_m_s: NotNegative = 0.0
     from_deg: Heading = 0.0
     """Where it blows from, as a weather report says it."""
-    turbulence: Annotated[float, Field(ge=0, le=15)] = 0.0
+    turbulence: Annotated[float, Field(ge=0, le=30)] = 0.0
     """Mean wind at 20 ft [m/s] that drives JSBSim's MIL-F-8785C turbulence; 0 is none."""
     vehicles: tuple[int, ...] | None = None
     """System ids it acts on; all, if absent."""
