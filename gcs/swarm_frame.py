@@ -17,7 +17,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SwarmFrame:
-    """A plane that touches the Earth near the fleet; 100 m from there it is good to a millimetre."""
+    """A plane at the fleet's height; 100 m from where it touches it is good to some millimetres, poles apart."""
 
     latitude_deg: float
     longitude_deg: float
@@ -31,7 +31,8 @@ class SwarmFrame:
         """(N, 2) m north, east of the swarm's origin, of (N,) geodetic places."""
         ne = np.empty((len(latitude_deg), 2))
         ne[:, 0] = (latitude_deg - self.latitude_deg) * self.metres_per_degree[0] - self.origin_ne[0]
-        ne[:, 1] = (longitude_deg - self.longitude_deg) * self.metres_per_degree[1] - self.origin_ne[1]
+        east_deg = (longitude_deg - self.longitude_deg + 180.0) % 360.0 - 180.0
+        ne[:, 1] = east_deg * self.metres_per_degree[1] - self.origin_ne[1]
         return ne
 
 
@@ -41,10 +42,10 @@ def swarm_frame(origin: Array, position_ne: Array, offset_ne: Array, run_up_ne: 
     origin: (N, 3) of each vehicle's own origin, latitude, longitude [degrees], altitude [m];  position_ne: (N, 2) m
     from it;  offset_ne: (N, 2) m, the formation;  run_up_ne: (2,) m from here to where the first leg begins.
     """
-    latitude, longitude = float(origin[0, 0]), float(origin[0, 1])
+    latitude, longitude, altitude = origin[0].tolist()
     tiny = 1e-4  # degrees, some 10 m: the curve of the Earth is 0.01 mm there
-    north, _, _ = pymap3d.geodetic2ned(latitude + tiny, longitude, 0.0, latitude, longitude, 0.0)
-    _, east, _ = pymap3d.geodetic2ned(latitude, longitude + tiny, 0.0, latitude, longitude, 0.0)
+    north, _, _ = pymap3d.geodetic2ned(latitude + tiny, longitude, altitude, latitude, longitude, altitude)
+    _, east, _ = pymap3d.geodetic2ned(latitude, longitude + tiny, altitude, latitude, longitude, altitude)
     touching = SwarmFrame(latitude, longitude, np.array([north, east]) / tiny, np.zeros(2))
     places = touching.to_ne(origin[:, 0], origin[:, 1]) + position_ne
     return SwarmFrame(latitude, longitude, touching.metres_per_degree, (places - offset_ne).mean(axis=0) + run_up_ne)
