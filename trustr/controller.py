@@ -97,7 +97,8 @@ def decide(observation: Observation, virtual: VirtualLeader, settings: Settings)
         # Followers know no path: whatever the leaders' feedback sums up to shears the formation and stays, and the mean
         # is off by it. So leaders answer for the mean, and the formation closes up (docs/recommended-profile.md).
         swarm_place = weighted_mean(graph, weights, place)
-        followers_a_leader = np.count_nonzero(heard & (observation.trust >= settings.threshold)) / len(leaders)
+        trusted = np.count_nonzero(heard & (observation.trust >= settings.threshold))
+        followers_a_leader = trusted / max(1, int(np.count_nonzero(heard[leaders])))
         command -= settings.formation_gain * (place - swarm_place)
         command[leaders] += navigational_feedback(
             swarm_place[leaders],

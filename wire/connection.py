@@ -47,6 +47,8 @@ def parse(text: str) -> list[Connection]:
         raise ConnectionRefused(f"{text!r}: {kind} is not a kind of link; allowed are udpin, udp (the same) and udpout")
     if not 1 <= first <= last <= 65535:
         raise ConnectionRefused(f"{text!r}: ports must be 1 to 65535, the first of a range not above the last")
+    if kind == "udpout" and not match[2]:
+        raise ConnectionRefused(f"{text!r}: udpout needs a host to speak to, as in udpout:127.0.0.1:14550")
     one = Connection("udpout" if kind == "udpout" else "udpin", host, first)
     return [replace(one, port=port) for port in range(first, last + 1)]
 
@@ -81,7 +83,7 @@ class UdpPort:
                 got.append(self._socket.recvfrom(DATAGRAM))
             except BlockingIOError:
                 break
-            except ConnectionRefusedError:  # nobody listens yet where we sent to: the kernel says so once a datagram
+            except OSError:  # what became of a datagram we sent (nobody listens, no way there) is told here, once each
                 continue
         return got
 
