@@ -63,3 +63,11 @@ def test_errors_of_the_formation_are_shared_out_so_that_the_mean_is_right():
     place = frame.to_ne(origins[:, 0], origins[:, 1]) + ragged - offset
     assert place.mean(0) == pytest.approx([0, 0], abs=1e-9)
     assert place == pytest.approx((ragged - offset) - (ragged - offset).mean(0), abs=1e-9)
+
+
+def test_a_fleet_may_straddle_the_date_line():
+    origin = np.array([[10.0, 179.99999, 0.0], [10.0, -179.99999, 0.0]])
+    frame = swarm_frame(origin, np.zeros((2, 2)), np.zeros((2, 2)), np.zeros(2))
+    places = frame.to_ne(origin[:, 0], origin[:, 1])
+    assert places.mean(axis=0) == pytest.approx([0, 0], abs=1e-6)
+    assert places[1, 1] - places[0, 1] == pytest.approx(2e-5 * frame.metres_per_degree[1], rel=1e-6)
