@@ -1,0 +1,121 @@
+"""Flights side by side: the table says which one passed, the picture shows both."""
+
+from io import StringIO
+
+import matplotlib.image as mpimg
+import pytest
+from flights import fly_and_record, recorded
+from rich.console import Console
+
+from gcs.compare import UnwritablePicture, compare
+from gcs.picture import FAILED, HEALTHY
+from gcs.recording.reader import UnreadableRecording
+
+AVERAGE = ("emergency", 'control.rule="average"')
+
+
+def compared(*paths, picture):
+    console = Console(file=StringIO(), width=110)
+    compare(paths, picture=picture, console=console)
+    return console.file.getvalue()
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory):
+    """What is printed, and the picture, of the averaged update and Trust-R."""
+    picture = tmp_path_factory.mktemp("compare") / "comparison.png"
+    return compared(recorded(*AVERAGE).folder, recorded("emergency").path, picture=picture), picture
+
+
+def test_the_table_has_a_column_for_each_flight_and_says_which_passed(both):
+    words, _ = both
+    (head,) = (line for line in words.splitlines() if "Averaged update" in line)
+    assert head.index("Averaged update (eq. 1)") < head.index("Trust-R, trust from truth")
+    (mission,) = (line for line in words.splitlines() if line.strip().startswith("mission"))
+    assert mission.split() == ["mission", "failed", "passed"]
+
+
+def test_the_table_has_the_figures_of_both_summaries(both):
+    words, _ = both
+    for flight in (recorded(*AVERAGE), recorded("emergency")):
+        assert f"{flight.summary.heading_error_deg:.1f}°" in words
+        assert f"{flight.summary.distance_to_target_m:.1f} m" in words
+    assert "at most 4°" in words
+    assert "at most 3.2 m" in words
+
+
+def test_every_path_is_told_whole_on_a_line_of_its_own(both):
+    words, picture = both
+    lines = words.splitlines()
+    assert f"picture    {picture.resolve()}" in lines
+    for flight in (recorded(*AVERAGE), recorded("emergency")):
+        assert f"recording  {flight.path.resolve()}" in lines
+
+
+def pixels(path):
+    assert path.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    return mpimg.imread(path)
+
+
+def shade(image, colour):
+    """How many pixels have this colour, or nearly: lines let a little of the paper through."""
+    wanted = [int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5)]
+    return int((abs(image[..., :3] - wanted).max(axis=2) < 0.1).sum())
+
+
+def test_the_picture_is_wide_enough_to_read_and_shows_the_failed_robot_twice(both):
+    _, picture = both
+    image = pixels(picture)
+    height, width = image.shape[:2]
+    assert 1200 <= width <= 2400
+    assert 700 <= height <= 1600
+    left, right = image[:, : width // 2], image[:, width // 2 :]
+    for half in (left, right):
+        assert shade(half, FAILED) > 300
+        assert all(shade(half, colour) > 50 for colour in (HEALTHY[0], HEALTHY[1], HEALTHY[2]))
+
+
+def test_every_run_leaves_a_picture_of_its_own():
+    image = pixels(recorded("emergency").folder / "trajectory.png")
+    assert image.shape[0] > 700
+    assert shade(image, FAILED) > 300
+    assert shade(pixels(recorded("demo").folder / "trajectory.png"), FAILED) == 0
+
+
+def test_one_recording_alone_is_a_table_with_one_column(tmp_path):
+    words = compared(recorded("demo").folder, picture=tmp_path / "one.png")
+    assert "recommended" in words
+    assert "passed" in words
+    assert "failed" not in words
+
+
+@pytest.mark.parametrize("suffix", [".pdf", ".svg"])
+def test_the_picture_comes_in_vectors_too(suffix, tmp_path):
+    picture = tmp_path / f"one{suffix}"
+    compared(recorded("demo").path, picture=picture)
+    assert picture.stat().st_size > 10_000
+
+
+def test_a_flight_that_never_got_to_its_mission_has_no_score_and_does_not_hide_the_other(tmp_path):
+    ended = fly_and_record("demo", "time.timeout_s=2")
+    words = compared(ended.folder, recorded("demo").folder, picture=tmp_path / "c.png")
+    (mission,) = (line for line in words.splitlines() if line.strip().startswith("mission"))
+    assert mission.split() == ["mission", "no", "score", "passed"]
+    with pytest.raises(UnreadableRecording, match="no recording has a mission"):
+        compared(ended.folder, picture=tmp_path / "none.png")
+
+
+def test_a_picture_that_cannot_be_written_is_refused_in_a_sentence(tmp_path):
+    (tmp_path / "file").touch()
+    for picture in (tmp_path / "nowhere" / "c.png", tmp_path / "file" / "c.png"):
+        with pytest.raises(UnwritablePicture, match="cannot be written: N"):
+            compared(recorded("demo").path, picture=picture)
+    with pytest.raises(UnwritablePicture, match=r"must end in \.png"):
+        compared(recorded("demo").path, picture=tmp_path / "c.txt")
+
+
+def test_nothing_to_compare_is_refused(tmp_path):
+    with pytest.raises(UnreadableRecording, match="at least one"):
+        compared(picture=tmp_path / "c.png")
+    with pytest.raises(UnreadableRecording, match="nowhere"):
+        compared(tmp_path / "nowhere", picture=tmp_path / "c.png")

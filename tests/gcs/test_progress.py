@@ -1,0 +1,120 @@
+"""The flight on a terminal, and where there is none."""
+
+from io import StringIO
+
+import pytest
+from flights import recorded
+from rich.console import Console
+
+from gcs.flight import Flight
+from gcs.loop import fly
+from gcs.progress import MOST_ROWS, Display
+from gcs.recording.reader import ticks
+from gcs.replay import EndOfRecording, Recorded
+from scenarios import load
+
+
+class Turns:
+    """A record that keeps every turn of the loop."""
+
+    def __init__(self):
+        self.turns = []
+
+    def tick(self, tick):
+        self.turns.append(tick)
+
+
+@pytest.fixture(scope="module")
+def flight():
+    """Every turn of the emergency, decided again from its recording."""
+    recording, kept = recorded("emergency"), Turns()
+    flight = Flight(recording.scenario)
+    pages = Recorded(list(ticks(recording.path)))
+    fly(pages, pages, flight, (kept,), period_ns=recording.scenario.time.period_ns, events=pages.events)
+    return flight, kept.turns
+
+
+def shown(flight, turns, **console):
+    screen = Console(file=StringIO(), **console)
+    with Display(flight, screen, title="emergency") as display:
+        for turn in turns:
+            display.tick(turn)
+    return screen.file.getvalue()
+
+
+def last_picture(screen):
+    """A live picture is drawn over and over."""
+    return screen.rpartition("emergency")[2]
+
+
+def test_where_there_is_no_terminal_each_phase_is_one_line(flight):
+    lines = shown(*flight, width=80).splitlines()
+    phases = [line.split("  ")[-1] for line in lines]
+    assert phases == ["joining", "taking off", "taking control", "running up", "mission", "landing", "done"]
+    assert not any("\x1b" in line for line in lines)
+
+
+def test_on_a_terminal_there_is_a_line_for_every_vehicle(flight):
+    decided, turns = flight
+    middle = next(turn for turn in turns if turn.diagnosis.mission_s >= 15.0)
+    screen = shown(decided, [middle], force_terminal=True, width=110, color_system=None)
+    assert screen.count("emergency") >= 1
+    screen = last_picture(screen)
+    assert "15.0 of 28.0 s" in screen
+    assert "mission · car accident area" in screen
+    rows = [line.split() for line in screen.splitlines() if line.strip()[:1].isdigit() and "offboard" in line]
+    assert [row[:3] for row in rows] == [
+        [str(system), "leader" if system in (1, 3) else "follower", "offboard"] for system in range(1, 7)
+    ]
+    assert [row[-1] for row in rows] == ["1.00", "1.00", "1.00", "1.00", "0.00", "1.00"]
+
+
+def test_before_a_vehicle_is_heard_it_says_so(flight):
+    decided, turns = flight
+    screen = shown(decided, turns[:1], force_terminal=True, width=110, color_system=None)
+    assert last_picture(screen).count("not heard") == 6
+    assert "nan" not in screen
+    assert "joining" in screen
+
+
+def test_the_whole_flight_can_be_shown_and_leaves_the_terminal_as_it_was(flight):
+    screen = shown(*flight, force_terminal=True, width=110)
+    assert "nan" not in screen
+    assert screen.rstrip().endswith("\x1b[2K")  # the last picture is wiped, line by line
+    assert screen.count("\x1b[?25l") == screen.count("\x1b[?25h")  # and the cursor is back
+
+
+def test_a_narrow_terminal_is_no_reason_to_fail(flight):
+    decided, turns = flight
+    assert "emergency" in shown(decided, turns[-1:], force_terminal=True, width=30)
+
+
+def test_of_a_large_fleet_the_first_are_shown_and_the_rest_counted():
+    large = load("demo", overrides=["swarm.rows=5", "swarm.columns=6"])
+    flight, kept = Flight(large), Turns()
+
+    class Nobody:
+        """A link on which nobody speaks, for one turn, and its clock."""
+
+        waited = 0
+
+        def now(self):
+            return 0
+
+        def sleep_until(self, _time_ns):
+            self.waited += 1
+            if self.waited > 1:
+                raise EndOfRecording
+
+        def receive(self):
+            return []
+
+        def send(self, _system, _frame):
+            pass
+
+    nobody = Nobody()
+    with pytest.raises(EndOfRecording):
+        fly(nobody, nobody, flight, (kept,), period_ns=10**8)
+    screen = shown(flight, kept.turns, force_terminal=True, width=110, height=60, color_system=None)
+    assert last_picture(screen).count("not heard") == MOST_ROWS
+    assert f"and {30 - MOST_ROWS} more" in screen
