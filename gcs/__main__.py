@@ -1,0 +1,5 @@
+"""`python -m gcs`."""
+
+from gcs.cli import main
+
+main()
