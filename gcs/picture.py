@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import matplotlib as mpl
@@ -56,7 +57,7 @@ def draw_side_by_side(panels: Sequence[Panel], path: Path, *, heading: str) -> N
         squeeze=False,
         layout="constrained",
     )
-    figure.suptitle(heading, fontsize=13, fontweight="bold")
+    figure.suptitle("\n".join(wrap(heading, width=70 * len(panels))), fontsize=13, fontweight="bold")
     for column, panel in enumerate(panels):
         _map(axes[0, column], panel, window)
         _trust(axes[1, column], panel, first=column == 0)
@@ -95,6 +96,8 @@ def _map(axes: Any, panel: Panel, window: Window) -> None:
     track, scenario = panel.track, panel.scenario
     path = plan(scenario)
     result = score(track, scenario)
+    axes.set_xlim(window[0])
+    axes.set_ylim(window[1])
     _draw_plan(axes, path)
     healthy = healthy_robots(scenario)
     for row, sound in enumerate(healthy):
@@ -118,8 +121,6 @@ def _map(axes: Any, panel: Panel, window: Window) -> None:
     axes.plot(mean[:, 1], mean[:, 0], color="black", lw=2.4, zorder=4)
     axes.plot(mean[-1, 1], mean[-1, 0], "D", color="black", ms=5, mec="white", zorder=6)
     axes.set_title(f"{panel.title}\n{_verdict(result, scenario)}", fontsize=11)
-    axes.set_xlim(window[0])
-    axes.set_ylim(window[1])
     axes.set_aspect("equal")
     axes.set_xlabel("east [m]")
     axes.set_ylabel("north [m]")
@@ -135,17 +136,25 @@ def _draw_plan(axes: Any, path: Plan) -> None:
             axes.plot(*_line(segment.end_ne, goal), color=ABANDONED, lw=1.6, ls=":", zorder=1)
         axes.plot(*_line(segment.start_ne, segment.end_ne), color=PLANNED, lw=1.8, ls="--", zorder=2)
         axes.plot(goal[1], goal[0], "*", color="#e8a200" if last else ABANDONED, ms=19, mec="#7a5500", zorder=6)
-        axes.annotate(
-            f"target {number}\n{segment.task}",
-            (goal[1], goal[0]),
-            xytext=(48, 14) if last else (0, 14),
-            textcoords="offset points",
-            ha="left" if last else "center",
-            fontsize=9,
-            bbox=LABEL,
-            arrowprops={"arrowstyle": "-", "color": "#7a5500", "lw": 0.8} if last else None,
-            zorder=7,
-        )
+        _label_target(axes, f"target {number}\n{segment.task}", goal, last=last)
+
+
+def _label_target(axes: Any, words: str, goal: Any, *, last: bool) -> None:
+    """Beside the star with a thin line to it; above it where the picture ends."""
+    west, east = axes.get_xlim()
+    at_the_edge = goal[1] > west + 0.7 * (east - west)
+    beside = (46, 14) if last else (56, -24)
+    axes.annotate(
+        words,
+        (goal[1], goal[0]),
+        xytext=(0, 26) if at_the_edge else beside,
+        textcoords="offset points",
+        ha="center" if at_the_edge else "left",
+        fontsize=9,
+        bbox=LABEL,
+        arrowprops={"arrowstyle": "-", "color": "#7a5500", "lw": 0.8},
+        zorder=7,
+    )
 
 
 def _line(start: Any, end: Any) -> tuple[list[float], list[float]]:

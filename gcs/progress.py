@@ -102,6 +102,8 @@ def _clock(tick: Tick, flight: Flight) -> str:
     mission_s = tick.diagnosis.mission_s
     if math.isnan(mission_s):
         return f"{tick.number * flight.scenario.time.period_s:6.1f} s after start"
+    if mission_s > flight.plan.read_out_s:
+        return f"{mission_s:6.1f} s of mission"
     return f"{mission_s:6.1f} of {flight.plan.read_out_s:.1f} s"
 
 
