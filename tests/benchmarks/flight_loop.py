@@ -1,7 +1,8 @@
 """What the flight loop costs beside the physics it flies.
 
 CPU of a whole lockstep flight with its recording (imports, loading and the picture left out), against a bare loop that
-steps the same six vehicles as many steps in bursts of 25. The two alternate, and medians are compared.
+steps the same six vehicles as many steps in bursts of 25. The two alternate, because machines change their pace: each
+flight is compared with the bare loops before and after it, and the median of these comparisons is what counts.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ from gcs.recording.writer import Recorder, Tap
 from gcs.track import Tracker
 from gcs.truth import Truth
 from scenarios import Scenario, load
+from tests.benchmarks.where import sample
 
-REPEATS = 5
+REPEATS = 7
 BURST = 25
 
 
@@ -36,13 +38,10 @@ class Cost:
     bare_s: float
     """CPU seconds."""
     loop_s: float
-    unrecorded_s: float
-    """CPU seconds of the loop without a recording."""
-
-    @property
-    def overhead(self) -> float:
-        """Everything but the physics, as a fraction of the physics."""
-        return (self.loop_s - self.bare_s) / self.bare_s
+    overhead: float
+    """Everything but the physics, as a fraction of the physics."""
+    unrecorded: float
+    """The same without a recording."""
 
     @property
     def vehicle_seconds(self) -> float:
@@ -53,18 +52,26 @@ class Cost:
 def measure(physics_hz: int) -> Cost:
     """Fly `emergency` under Trust-R."""
     scenario = load("emergency", overrides=[f"time.physics_hz={physics_hz}"])
-    bare, loop, unrecorded, ticks = [], [], [], 0
+    ticks = _flight(scenario, recorded=True)[1]
+    steps = ticks * scenario.time.steps_per_tick
+    bare = [_bare(scenario, steps)]
+    loops: list[float] = []
+    ratios: dict[bool, list[float]] = {True: [], False: []}
     for _ in range(REPEATS):
-        seconds, ticks = _flight(scenario, recorded=True)
-        loop.append(seconds)
-        bare.append(_bare(scenario, ticks * scenario.time.steps_per_tick))
-        unrecorded.append(_flight(scenario, recorded=False)[0])
+        for recorded in (True, False):
+            seconds = _flight(scenario, recorded=recorded)[0]
+            bare.append(_bare(scenario, steps))
+            beside = 0.5 * (bare[-1] + bare[-2])
+            ratios[recorded].append((seconds - beside) / beside)
+            if recorded:
+                loops.append(seconds)
     return Cost(
         physics_hz,
         ticks * scenario.time.period_s,
         statistics.median(bare),
-        statistics.median(loop),
-        statistics.median(unrecorded),
+        statistics.median(loops),
+        statistics.median(ratios[True]),
+        statistics.median(ratios[False]),
     )
 
 
@@ -114,15 +121,19 @@ def _timed(work: Callable[[], int]) -> tuple[float, int]:
 
 def main() -> None:
     """Print a table."""
-    print("flight loop of `emergency`, six vehicles; CPU seconds, median of", REPEATS)
-    print("physics   simulated   bare   loop   of that recording   overhead   vehicle-s per CPU-s")
+    print("flight loop of `emergency`, six vehicles; CPU seconds, medians of", REPEATS)
+    print("physics   simulated   bare   loop   overhead   without recording   vehicle-s per CPU-s")
     for hz in (250, 200, 100):
         cost = measure(hz)
-        recording = cost.loop_s - cost.unrecorded_s
         print(
-            f"{hz:4d} Hz   {cost.simulated_s:7.1f} s  {cost.bare_s:5.3f}  {cost.loop_s:5.3f}   {recording:17.3f}"
-            f"   {cost.overhead:8.2f}   {cost.vehicle_seconds:19.0f}"
+            f"{hz:4d} Hz   {cost.simulated_s:7.1f} s  {cost.bare_s:5.3f}  {cost.loop_s:5.3f}   {cost.overhead:8.2f}"
+            f"   {cost.unrecorded:17.2f}   {cost.vehicle_seconds:19.0f}"
         )
+    print("\nwhere it goes at 250 Hz, as a fraction of the physics in the loop")
+    scenario = load("emergency")
+    counted = sample(lambda: [_flight(scenario, recorded=True) for _ in range(8)])
+    for part, count in counted.most_common():
+        print(f"  {count / counted['physics']:5.2f}  {part}")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""How far a flight over UDP in real time ends from the lockstep flight with the same seed: `python -m tests.benchmarks.udp`.
+"""How far flights over UDP in real time end from the lockstep flight with their seed: `python -m tests.benchmarks.udp`.
 
 Not part of `make bench`: five repetitions take five minutes of wall time.
 """
