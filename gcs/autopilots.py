@@ -37,12 +37,12 @@ class Px4:
 
     height_m: float
     """Above each vehicle's home."""
-    period_s: float
-    """Between two ticks: position and velocity are asked for twice in each, so that none is older than half of it."""
+    position_s: float
+    """How often each vehicle tells its position and velocity."""
 
     def subscribe(self) -> tuple[Command, ...]:
         """What to ask of a vehicle when it is first heard."""
-        streams = ((messages.LOCAL_POSITION_NED, 0.5 * self.period_s), *SLOW_S)
+        streams = ((messages.LOCAL_POSITION_NED, self.position_s), *SLOW_S)
         return (*(RequestStream(*stream) for stream in streams), RequestMessage(messages.GPS_GLOBAL_ORIGIN))
 
     def known(self, swarm: Swarm, row: int) -> bool:

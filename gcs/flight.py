@@ -137,7 +137,8 @@ class Flight:
         self._offset_ne = offsets_ne(scenario)
         self._trust = trust_source(scenario)
         self._leader = mission.PROFILES[scenario.control.profile]
-        self._autopilot = Px4(height_m=scenario.swarm.altitude_m, period_s=scenario.time.period_s)
+        position_s = scenario.time.period_s / scenario.time.positions_per_tick
+        self._autopilot = Px4(height_m=scenario.swarm.altitude_m, position_s=position_s)
         self._limits = Limits(scenario.limits.speed_m_s, scenario.limits.acceleration_m_s2)
         self._period_s = scenario.time.period_s
         self._run_up_ticks = scenario.time.ticks(scenario.mission.run_up_s)

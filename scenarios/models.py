@@ -31,6 +31,9 @@ class Time(Section):
     """JSBSim steps a second."""
     period_s: Positive = 0.1
     """One tick of the ground station: a whole number of physics steps."""
+    positions_per_tick: Annotated[int, Field(ge=1, le=20)] = 1
+    """How often in a tick each vehicle is asked to tell where it is. Once is enough in lockstep, where nothing is late;
+    `gcs fly` asks five times, so that nothing is older than a fifth of a tick."""
     timeout_s: Positive = 180.0
     """A flight that takes longer, take-off to disarm, is given up (exit code 3)."""
 
