@@ -60,7 +60,7 @@ def test_a_file_of_ones_own_loads_by_its_path(tmp_path):
 
 EVERY_KEY = tomllib.loads("""
 title = "another"
-time = {physics_hz = 500, period_s = 0.2, timeout_s = 90.0}
+time = {physics_hz = 500, period_s = 0.2, positions_per_tick = 4, timeout_s = 90.0}
 swarm = {rows = 3, columns = 4, spacing_m = 4.0, leaders = [1, 2], altitude_m = 12.0}
 mission = {cruise_m_s = 1.0, run_up_s = 0.0, leg = [{task = "look", heading_deg = 15.0, length_m = 25.0}]}
 event = [{kind = "redirect", at_length_m = 12.0, task = "call", heading_deg = -30.0, length_m = 20.0}]
