@@ -160,7 +160,7 @@ class Flight:
     def __call__(self, state: FlightState, swarm: Swarm, events: Iterable[str], now_ns: int) -> Step:
         """One tick. events: what an operator asked for since the last; "land" ends the flight."""
         if "land" in events and state.phase not in (Phase.LAND, Phase.DONE):
-            state = _enter(state, Phase.LAND)
+            state = _abandoned(state)
         state = self._watch(state, swarm, now_ns)
         state, commands, diagnosis = self._phases[state.phase](state, swarm, now_ns)
         if state.tick % self.scenario.time.ticks(1.0) == 0:
@@ -175,7 +175,8 @@ class Flight:
             if in_phase_s > LANDING_S:
                 return _failed(state, f"not every vehicle landed within {LANDING_S:g} s", Phase.DONE)
         elif state.tick * self._period_s > timeout_s and state.phase is not Phase.DONE:
-            return _failed(state, f"the flight took longer than time.timeout_s = {timeout_s:g} s", Phase.LAND)
+            problem = f"the flight took longer than time.timeout_s = {timeout_s:g} s"
+            return _failed(_abandoned(state), problem, Phase.LAND)
         elif state.phase in BEFORE_MISSION:
             silent = ~swarm.fresh(now_ns, within_ns=LOST_NS)
             if silent.any():
@@ -361,6 +362,11 @@ class Flight:
 def _enter(state: FlightState, phase: Phase) -> FlightState:
     """The first tick of a phase; nobody has been asked for anything in it."""
     return replace(state, phase=phase, phase_tick=state.tick, asked=(Asked(),) * len(state.asked))
+
+
+def _abandoned(state: FlightState) -> FlightState:
+    """Land before the mission is over: its clock stops, so that nobody scores what the landing does."""
+    return replace(_enter(state, Phase.LAND), mission_tick=None)
 
 
 def _failed(state: FlightState, problem: str, phase: Phase) -> FlightState:
