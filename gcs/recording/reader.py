@@ -24,7 +24,7 @@ from scenarios import Scenario
 from wire.frames import Frame, Framer
 
 RECORD_SIZE_LIMIT = 64 << 20
-DAMAGE = (McapError, struct.error, LookupError, ValueError, TypeError, RuntimeError, OverflowError)
+DAMAGE = (McapError, struct.error, LookupError, ValueError, TypeError, RuntimeError, OverflowError, MemoryError)
 """What a torn, flipped or foreign file makes the readers raise: mcap's own, LZ4's, and those of what they hand on."""
 
 
