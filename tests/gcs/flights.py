@@ -28,6 +28,9 @@ SEEDS = range(1, 31 if SOAK else 2)
 REPETITIONS = 5 if SOAK else 1
 """Of the flight over UDP."""
 
+SHORT = ("mission.leg.0.length_m=3", "mission.leg.1.length_m=4.5", "mission.run_up_s=1")
+"""Makes a demo of a dozen seconds."""
+
 GCS = Path(sys.executable).with_name("gcs")
 FDM = Path(sys.executable).with_name("fdm")
 

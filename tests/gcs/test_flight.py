@@ -300,6 +300,13 @@ def test_an_operator_lands_the_fleet_from_every_phase(phase):
     assert log.ticks_of(SetVelocity)[-1:] < [asked]
 
 
+def test_a_mission_given_up_has_no_clock_any_more_and_so_no_score():
+    asked = NOMINAL.first(Phase.MISSION) + 5
+    log = Log(Fleet(), events=lambda tick, _phase: ("land",) if tick == asked else ())
+    assert log.diagnoses[asked - 1].mission_s == pytest.approx(0.4)
+    assert all(np.isnan(diagnosis.mission_s) and diagnosis.virtual is None for diagnosis in log.diagnoses[asked:])
+
+
 def test_landing_asked_for_twice_is_landing_once():
     asked = NOMINAL.first(Phase.MISSION) + 5
     log = Log(Fleet(), events=lambda tick, _phase: ("land",) if tick in (asked, asked + 3) else ())

@@ -18,12 +18,13 @@ NAMES = ("transit", "emergency")
 SEVERITIES = (0.4, 0.7)
 LOST = {"emergency": (10.0, 6.0), "transit": (20.0, 12.0)}
 """Degrees and metres from which the averaged update has lost the mission, as in the paper."""
+flight = cache(one_flight)
 QUIET = Console(file=StringIO())
 
 
 def flown(name, severity, controller, profile):
     """Scores over all seeds."""
-    return [one_flight(Condition(name, severity, controller, profile), seed) for seed in SEEDS]
+    return [flight(Condition(name, severity, controller, profile), seed) for seed in SEEDS]
 
 
 def means(scores):
@@ -106,7 +107,7 @@ def test_the_result_does_not_depend_on_the_number_of_processes():
 
 def test_other_processes_fly_what_this_one_flies():
     (row,), (recommended,) = small(2).rows, small(2).recommended
-    here, there = one_flight(SMALL[0], 1), one_flight(SMALL[1], 1)
+    here, there = flight(SMALL[0], 1), flight(SMALL[1], 1)
     assert (row.heading_error_deg.mean, row.distance_to_target_m.mean) == (
         here.heading_error_deg,
         here.distance_to_target_m,

@@ -1,0 +1,319 @@
+"""The `gcs` command as a person or a script meets it: words, exit codes, files, JSON."""
+
+import re
+import resource
+import signal
+import socket
+import subprocess
+import sys
+from contextlib import closing
+
+import orjson
+import pytest
+from flights import GCS, SHORT, recorded, start
+
+from gcs import cli
+from gcs.replay import decide_again
+
+CONTRACT = {
+    "scenario", "controller", "trust", "severity", "seed", "heading_error_deg", "distance_to_target_m",
+    "min_separation_m", "passed", "detected", "false_alarms", "simulated_s", "real_time_factor", "recording",
+}  # fmt: skip
+BESIDES = {"profile", "scored_on", "problem"}
+"""Keys that the contract does not have yet."""
+BRIEFLY = [word for override in SHORT for word in ("--set", override)]
+
+
+@pytest.fixture
+def gcs(capfd):
+    """Run `gcs` with these words in this process: (exit code, stdout, stderr)."""
+
+    def run(*words):
+        with pytest.raises(SystemExit) as ended:
+            cli.main([str(word) for word in words])
+        return ended.value.code or 0, *capfd.readouterr()
+
+    return run
+
+
+def one_sentence(words):
+    """Whether it is a single line to a person."""
+    return words.count("\n") == 1 and words.startswith("gcs: ") and "Traceback" not in words
+
+
+def test_json_is_one_object_with_the_contracts_keys_and_the_same_as_the_file(gcs, tmp_path):
+    code, out, err = gcs("run", "demo", *BRIEFLY, "--seed", "7", "--out", tmp_path, "--json")
+    assert code == 0
+    assert out.count("\n") == 1
+    result = orjson.loads(out)
+    assert result.keys() == CONTRACT | BESIDES
+    assert (result["scenario"], result["controller"], result["trust"], result["seed"]) == (
+        "demo",
+        "trust-r",
+        "truth",
+        7,
+    )
+    assert (result["severity"], result["detected"], result["false_alarms"]) == (None, {}, 0)
+    assert result["recording"] == str((tmp_path / "run.mcap").resolve())
+    assert result == orjson.loads((tmp_path / "summary.json").read_bytes())
+    assert {path.name for path in tmp_path.iterdir()} == {"run.mcap", "summary.json", "trajectory.png"}
+    assert "mission" in err
+
+
+def test_a_run_in_words_says_what_was_flown_how_it_ended_and_where_it_is(gcs, tmp_path):
+    code, out, _ = gcs("run", "demo", *BRIEFLY, "--out", tmp_path)
+    assert code == 0
+    assert out.startswith("demo: trust-r, trust from truth, no fault\n")
+    assert re.search(r"^(passed|failed): heading off by \d+\.\d°, \d+\.\d m from the target", out, re.MULTILINE)
+    assert f"recording  {(tmp_path / 'run.mcap').resolve()}\n" in out
+    assert f"picture    {(tmp_path / 'trajectory.png').resolve()}\n" in out
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ("--controller average --severity 0.7", {"controller": "average", "trust": None, "severity": 0.7}),
+        (
+            "--trust ratings --set control.profile=recommended",
+            {"controller": "trust-r", "trust": "ratings", "severity": 0.4, "profile": "recommended"},
+        ),
+        ("--no-fault --severity 0.7", {"severity": None, "detected": {}}),
+    ],
+    ids=["average", "ratings", "no-fault"],
+)
+def test_every_choice_reaches_the_flight(gcs, tmp_path, options, expected):
+    short = ("--set", "mission.leg.0.length_m=3", "--set", "event.0.at_length_m=1", "--set", "event.0.length_m=2")
+    code, out, _ = gcs(
+        "run", "emergency", *short, "--set", "mission.run_up_s=1", *options.split(), "--out", tmp_path, "--json"
+    )
+    assert code == 0
+    assert orjson.loads(out).items() >= expected.items()
+
+
+def test_a_failed_mission_is_a_flight_all_the_same():
+    summary = recorded("emergency", 'control.rule="average"').summary
+    assert not summary.passed
+    assert summary.completed
+
+
+def test_trust_from_the_studys_ratings_flies_too():
+    flight = recorded("emergency", 'trust.source="ratings"')
+    assert flight.summary.passed
+    assert flight.summary.detected == {"5": 0.0}
+    assert flight.summary.false_alarms == 0
+
+
+def test_the_demo_passes():
+    assert recorded("demo").summary.passed
+
+
+def test_a_flight_that_takes_too_long_is_not_completed(gcs, tmp_path):
+    code, out, err = gcs("run", "demo", "--set", "time.timeout_s=3", "--out", tmp_path, "--json")
+    result = orjson.loads(out)
+    assert code == 3
+    assert "time.timeout_s = 3 s" in result["problem"]
+    assert result["problem"] in err
+    assert result["heading_error_deg"] is result["distance_to_target_m"] is result["min_separation_m"] is None
+    assert result["passed"] is False
+    assert (tmp_path / "run.mcap").stat().st_size > 10_000
+
+
+def test_robots_that_touch_end_in_a_problem(gcs, tmp_path):
+    crowded = ("--set", "swarm.spacing_m=0.7", "--set", "control.separation_gain=0")
+    code, out, err = gcs("run", "demo", *BRIEFLY, *crowded, "--out", tmp_path)
+    assert code == 3
+    assert "their rotors would have touched" in err
+    assert out.splitlines()[1].startswith("failed")
+
+
+REFUSED = [
+    (["run", "emergency", "--bogus"], "--bogus"),
+    (["run"], "SCENARIO"),
+    (["nosuch"], "nosuch"),
+    (["run", "nosuch"], "demo, emergency, transit"),
+    (["run", "emergency", "trust-r"], "trust-r"),
+    (["run", "emergency", "--controller", "guess"], '"average", "trust-r"'),
+    (["run", "emergency", "--severity", "1.5"], "--severity 1.5: must be 0 to 1"),
+    (["run", "emergency", "--severity", "nan"], "--severity nan"),
+    (["run", "emergency", "--severity", "half"], '"half"'),
+    (["run", "emergency", "--seed", "-1"], "--seed -1"),
+    (["run", "emergency", "--set", "network.best_range_m=28"], "best_range_m = 28.0 must be below range_m = 28.0"),
+    (["run", "emergency", "--set", "network.range_m=5"], "best_range_m = 6.0 must be below range_m = 5.0"),
+    (["run", "emergency", "--set", "fault.0.vehicle=7"], "fault.0.vehicle = 7: there is no such vehicle"),
+    (["run", "emergency", "--set", "fault.0.max_speed_fraction=1.5"], "max_speed_fraction = 1.5"),
+    (["run", "emergency", "--set", "mission.cruise=2"], "did you mean cruise_m_s?"),
+    (["run", "emergency", "--set", "control.c1=nan"], "control.c1"),
+    (["run", "emergency", "--set", "nonsense"], "section.key=value"),
+    (["fly", "emergency"], "--link"),
+    (["fly", "emergency", "--link", "hello"], "'hello'"),
+    (["fly", "emergency", "--link", "tcp:127.0.0.1:1"], "tcp"),
+    (["fly", "emergency", "--link", "udpin:127.0.0.1:70000"], "65535"),
+    (["fly", "emergency", "--link", "udpin:127.0.0.1:14999", "--arm"], "--yes"),
+    (["fly", "emergency", "--link", "udpin:127.0.0.1:14999", "--speed", "0"], "--speed 0"),
+    (["fly", "emergency", "--link", "udpin:127.0.0.1:14999", "--speed", "nan"], "--speed nan"),
+    (["fly", "emergency", "--link", "udpin:127.0.0.1:14999", "--speed", "inf"], "--speed inf"),
+    (["reproduce", "--seeds", "0"], "--seeds 0"),
+    (["reproduce", "--jobs", "0"], "--jobs 0"),
+    (["compare"], "at least one"),
+    (["compare", "nowhere"], "nowhere"),
+    (["replay", "--verify", "nowhere"], "nowhere"),
+    (["replay", "nowhere"], "--verify"),
+]
+
+
+@pytest.mark.parametrize(("words", "said"), REFUSED, ids=[" ".join(words) for words, _ in REFUSED])
+def test_bad_input_is_one_sentence_that_names_it_and_exit_code_2(gcs, tmp_path, monkeypatch, words, said):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = gcs(*words)
+    assert code == 2
+    assert out == ""
+    assert one_sentence(err), err
+    assert said in err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("words", ["run demo", "reproduce --seeds 1", "fly demo --link udpout:127.0.0.1:9 --arm --yes"])
+def test_a_folder_that_cannot_be_made_is_refused_before_anything_flies(gcs, tmp_path, words):
+    (tmp_path / "file").write_text("in the way")
+    for out in (tmp_path / "file", tmp_path / "file" / "below"):
+        code, _, err = gcs(*words.split(), "--out", out)
+        assert code == 2
+        assert one_sentence(err)
+        assert f"--out {out}: cannot be written" in err
+    assert (tmp_path / "file").read_text() == "in the way"
+
+
+def test_a_recording_that_cannot_be_opened_is_refused(gcs, tmp_path):
+    (tmp_path / "run.mcap").mkdir()
+    code, _, err = gcs("run", "demo", "--out", tmp_path)
+    assert code == 2
+    assert one_sentence(err)
+    assert "run.mcap" in err
+
+
+def test_a_busy_port_is_refused(gcs, tmp_path):
+    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as taken:
+        taken.bind(("127.0.0.1", 0))
+        link = f"udpin:127.0.0.1:{taken.getsockname()[1]}"
+        code, _, err = gcs("fly", "demo", "--link", link, "--arm", "--yes", "--out", tmp_path)
+    assert code == 2
+    assert one_sentence(err)
+    assert link in err
+    assert "in use" in err
+
+
+def test_a_torn_or_foreign_recording_is_refused_by_every_command_that_reads(gcs, tmp_path):
+    data = recorded("demo", *SHORT).path.read_bytes()
+    for name, content in (("torn", data[: len(data) // 2]), ("empty", b""), ("text", b"hello\n" * 100)):
+        path = tmp_path / f"{name}.mcap"
+        path.write_bytes(content)
+        for words in (["compare", path, "--out", tmp_path / "c.png"], ["replay", "--verify", path]):
+            code, out, err = gcs(*words)
+            assert (code, out) == (2, "")
+            assert one_sentence(err)
+            assert str(path) in err
+
+
+def test_replay_and_compare_speak_on_stdout(gcs, tmp_path):
+    path = recorded("demo", *SHORT).path
+    code, out, err = gcs("replay", "--verify", path)
+    assert (code, err) == (0, "")
+    assert "identical to the bit" in out
+    code, out, err = gcs("compare", path, path.parent, "--out", tmp_path / "c.png")
+    assert (code, err) == (0, "")
+    assert len(re.findall("passed|failed", out)) == 2
+
+
+def test_scenarios_are_listed_for_people_and_for_programs(gcs):
+    code, out, err = gcs("scenarios")
+    assert (code, err) == (0, "")
+    assert all(name in out for name in ("demo", "emergency", "transit"))
+    _, out, _ = gcs("scenarios", "--json")
+    listed = {row["name"]: row for row in orjson.loads(out)["scenarios"]}
+    assert listed.keys() == {"demo", "emergency", "transit"}
+    assert listed["demo"]["faults"] == []
+    assert listed["emergency"]["vehicles"] == 6
+    assert listed["transit"]["duration_s"] == pytest.approx(38 / 1.5 + 2, abs=1e-3)
+
+
+def test_a_scenario_can_be_a_file(gcs, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('title = "mine"\nmission.leg = [{task = "there", heading_deg = 0, length_m = 3}]\n')
+    code, out, _ = gcs(
+        "run", path, "--set", "swarm.columns=1", "--set", "swarm.leaders=[1]", "--out", tmp_path, "--json"
+    )
+    assert code == 0
+    assert orjson.loads(out)["scenario"] == str(path)
+
+
+def test_without_out_a_run_is_put_in_a_folder_of_its_own(gcs, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = gcs("run", "demo", "--set", "time.timeout_s=2", "--json")
+    assert code == 3
+    (folder,) = (tmp_path / "runs").iterdir()
+    assert re.fullmatch(r"\d{8}T\d{6}-demo", folder.name)
+    assert orjson.loads(out)["recording"] == str(folder / "run.mcap")
+
+
+def helped(*python):
+    """`gcs --help` in a process of its own: what it prints, and the CPU seconds it took."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    words = [
+        sys.executable,
+        *python,
+        "-c",
+        "import sys; sys.argv = ['gcs', '--help']; from gcs.cli import main; main()",
+    ]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return done, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def test_help_names_every_command_and_imports_nothing_heavy():
+    done, _ = helped("-X", "importtime")
+    assert all(name in done.stdout for name in ("run", "fly", "reproduce", "scenarios", "compare", "replay"))
+    imported = {line.split("|")[-1].strip() for line in done.stderr.splitlines()}
+    assert "gcs.cli" in imported
+    for heavy in ("matplotlib", "jsbsim", "scipy", "numpy", "pydantic", "pymavlink", "joblib"):
+        assert heavy not in imported
+
+
+def test_help_comes_within_a_second():
+    assert min(helped()[1] for _ in range(3)) < 1.0
+
+
+def until_said(process, words):
+    """Read stderr until it says this."""
+    for line in process.stderr:
+        if words in line:
+            return
+    raise AssertionError(f"it ended without saying {words!r}")
+
+
+def test_ctrl_c_in_lockstep_lands_closes_the_recording_and_ends_with_130(tmp_path):
+    process = start(GCS, "run", "emergency", "--set", "event.0.length_m=300", "--out", tmp_path, "--json")
+    until_said(process, "mission")
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in err
+    assert "landing" in err
+    result = orjson.loads(out)
+    assert result["problem"] is None
+    assert result["passed"] is False
+    assert result["simulated_s"] < 200
+    assert decide_again(tmp_path / "run.mcap").difference is None
+
+
+def test_a_second_ctrl_c_ends_at_once_and_the_recording_is_whole(tmp_path):
+    process = start(
+        GCS, "run", "emergency", "--set", "event.0.length_m=3000", "--set", "time.timeout_s=3000", "--out", tmp_path
+    )
+    until_said(process, "mission")
+    process.send_signal(signal.SIGINT)
+    until_said(process, "Once more")
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in err
+    assert decide_again(tmp_path / "run.mcap").difference is None
