@@ -16,6 +16,8 @@ from scenarios import Scenario, direction
 
 PERIOD_S = 0.1
 """How often the air is renewed."""
+BLUR_S = 0.1
+"""How long one draw of measurement noise lasts."""
 
 
 class Surroundings:
@@ -28,6 +30,8 @@ class Surroundings:
         self._turbulence = scenario.wind.turbulence if _is_in_the_wind(scenario, vehicle) else 0.0
         self._air: Iterator[tuple[float, ...]] | None = None
         self._blur: Iterator[tuple[float, ...]] | None = None
+        self._draw: tuple[float, ...] = ()
+        self._draws = 0
         self._rotors = self._faults.rotors(-math.inf)
         self._start_s = math.inf
 
@@ -40,6 +44,7 @@ class Surroundings:
         self._start_s = time_s
         self._air = _gusts(self._scenario, self._system, self._seed)
         self._blur = _blur(self._scenario, self._system, self._seed)
+        self._draws = 0
         vehicle.set_turbulence(self._turbulence)
 
     def end(self, vehicle: Vehicle) -> None:
@@ -69,10 +74,17 @@ class Surroundings:
         return self._faults.flown(velocity_ned, time_s - self._start_s)
 
     def measured(self, truth: tuple[float, ...], time_s: float) -> tuple[float, ...]:
-        """(n, e, d, vn, ve, vd) as this telemetry message reports it; one draw a message."""
-        if time_s < self._start_s or self._blur is None:
+        """(n, e, d, vn, ve, vd) as telemetry reports it: a new draw every BLUR_S, whoever asks and however often.
+
+        So every message of a stream at 10 Hz has its own, and two flights with one seed see the same noise even if one
+        asks more often, or at other moments of a tick, than the other.
+        """
+        if time_s <= self._start_s or self._blur is None:
             return truth
-        n, e, vn, ve = next(self._blur)
+        draws = math.ceil((time_s - self._start_s) / BLUR_S - 1e-6)
+        while self._draws < draws:
+            self._draw, self._draws = next(self._blur), self._draws + 1
+        n, e, vn, ve = self._draw
         return truth[0] + n, truth[1] + e, truth[2], truth[3] + vn, truth[4] + ve, truth[5]
 
 

@@ -232,9 +232,9 @@ class Noise(Section):
     """What blurs telemetry and air, seeded, counted from mission start."""
 
     velocity_m_s: NotNegative = 0.0
-    """Standard deviation a horizontal axis, white, each telemetry message."""
+    """Standard deviation a horizontal axis, white: drawn anew for each telemetry message of a 10 Hz stream."""
     position_m: NotNegative = 0.0
-    """Standard deviation a horizontal axis, white, each telemetry message."""
+    """As the velocity's."""
     gust_m_s: NotNegative = 0.0
     """Standard deviation an axis of each vehicle's own first-order Gauss–Markov wind."""
     gust_time_s: Positive = 2.0
