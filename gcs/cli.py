@@ -121,7 +121,7 @@ def fly(
         _check_seed(seed)
         if not 0.0 < speed < math.inf:
             raise BadUsageError(f"--speed {speed}: must be a number above 0")
-        chosen = choices.scenario(scenario)
+        chosen = choices.scenario(scenario, LIVE_POSITIONS)
         connections = [connection for text in link for connection in parse(text)]
         if arm and not _confirmed(yes):
             return BAD_INPUT
