@@ -1,0 +1,265 @@
+"""The ground station and the vehicles as two processes over UDP; and the link and clock that make it so."""
+
+import signal
+import socket
+import subprocess
+import time
+from contextlib import closing, contextmanager
+
+import numpy as np
+import orjson
+import pytest
+from flights import FDM, GCS, REPETITIONS, messages, recorded, start
+from pymavlink.dialects.v20 import common as dialect
+
+from gcs.live import Live
+from gcs.recording.reader import read
+from gcs.replay import decide_again
+from wire.connection import Connection, ConnectionRefused
+from wire.frames import Sender
+
+SPEED = 4
+HOST = "127.0.0.1"
+
+
+def free_port():
+    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as probe:
+        probe.bind((HOST, 0))
+        return probe.getsockname()[1]
+
+
+@contextmanager
+def vehicles(scenario, port, *options, speed=SPEED):
+    """`fdm serve`, for as long as it is needed."""
+    server = start(FDM, "serve", scenario, "--to", f"udpout:{HOST}:{port}", "--speed", speed, *options)
+    try:
+        yield server
+    finally:
+        server.send_signal(signal.SIGINT)
+        _, err = server.communicate(timeout=20)
+        assert "Traceback" not in err
+
+
+def fly(scenario, port, *options, speed=SPEED):
+    words = [GCS, "fly", scenario, "--link", f"udpin:{HOST}:{port}", "--speed", speed, "--json", *options]
+    return start(*words, stdin=subprocess.DEVNULL)
+
+
+def ended(process):
+    """(exit code, the object on stdout, what was said)."""
+    out, err = process.communicate(timeout=120)
+    assert "Traceback" not in err, err
+    return process.returncode, orjson.loads(out), err
+
+
+def flown_over_udp(out):
+    port = free_port()
+    with vehicles("emergency", port, "--seed", "1"):
+        return ended(fly("emergency", port, "--seed", "1", "--arm", "--yes", "--out", out))
+
+
+@pytest.fixture(scope="module")
+def over_udp(tmp_path_factory):
+    """Flights of the emergency with seed 1: (exit code, summary, words, folder) each."""
+    folders = [tmp_path_factory.mktemp("live") for _ in range(REPETITIONS)]
+    return [(*flown_over_udp(folder), folder) for folder in folders]
+
+
+@pytest.mark.wall_clock
+def test_a_flight_over_udp_ends_where_the_lockstep_flight_with_its_seed_does(over_udp):
+    lockstep = recorded("emergency").read().track
+    for *_, folder in over_udp:
+        live = read(folder / "run.mcap").track
+        assert live.time_s[-1] == lockstep.time_s[-1]
+        apart = np.linalg.norm(live.position[-1] - lockstep.position[-1], axis=1)
+        assert (apart <= 0.5).all()
+
+
+@pytest.mark.wall_clock
+def test_it_passes_as_that_one_does_and_says_so_in_the_same_words(over_udp):
+    for code, summary, words, _ in over_udp:
+        assert (code, summary["passed"], summary["scored_on"], summary["problem"]) == (0, True, "truth", None)
+        assert summary.keys() == orjson.loads(recorded("emergency").summary.json()).keys()
+        assert summary["real_time_factor"] == pytest.approx(SPEED, rel=0.05)
+        assert all(phase in words for phase in ("joining", "taking off", "mission", "landing"))
+
+
+@pytest.mark.wall_clock
+def test_its_recording_is_decided_again_to_the_bit(over_udp):
+    for *_, folder in over_udp:
+        result = decide_again(folder / "run.mcap")
+        assert result.difference is None
+        assert result.setpoints > 1900
+
+
+@pytest.mark.wall_clock
+def test_its_ticks_are_late_by_less_than_a_period_and_none_is_left_out(over_udp):
+    for *_, folder in over_udp:
+        ticks = [orjson.loads(data) for topic, _, data in messages(folder / "run.mcap") if topic == "/tick"]
+        assert [tick["number"] for tick in ticks] == list(range(len(ticks)))
+        late = np.array([tick["lateness_ns"] for tick in ticks]) / 1e9
+        assert late.min() >= 0
+        assert np.median(late) < 0.05
+
+
+@pytest.mark.wall_clock
+def test_ctrl_c_lands_everybody_closes_the_recording_and_ends_with_130(tmp_path):
+    port = free_port()
+    endless = ("--set", "mission.leg.1.length_m=200")
+    with vehicles("demo", port, speed=8):
+        process = fly("demo", port, *endless, "--arm", "--yes", "--out", tmp_path, speed=8)
+        for line in process.stderr:
+            if "mission" in line:
+                break
+        process.send_signal(signal.SIGINT)
+        code, summary, words = ended(process)
+    assert code == 130
+    assert "landing" in words
+    assert summary["problem"] is None
+    assert summary["heading_error_deg"] is None
+    assert decide_again(tmp_path / "run.mcap").difference is None
+    assert read(tmp_path / "run.mcap").track.time_s[-1] < 10.0
+    beats = {}
+    for topic, _, data in messages(tmp_path / "run.mcap"):
+        if topic.endswith("_1/raw") and data[7:10] == b"\0\0\0":
+            beats[topic] = dialect.MAVLink(None).decode(bytearray(data))
+    assert len(beats) == 6
+    assert not any(beat.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED for beat in beats.values())
+
+
+class Vehicles:
+    """Six of them behind one socket: they beat, and count what they are sent."""
+
+    def __init__(self, port):
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._to = (HOST, port)
+        self._senders = [Sender(system, 1) for system in range(1, 7)]
+        self.received = []
+
+    def beat(self, systems=range(1, 7)):
+        for system in systems:
+            beat = dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3)
+            self._socket.sendto(self._senders[system - 1].pack(beat), self._to)
+        self.listen()
+
+    def listen(self):
+        while True:
+            try:
+                self.received.append(self._socket.recvfrom(2048))
+            except (BlockingIOError, ConnectionRefusedError):
+                return
+
+    def close(self):
+        self._socket.close()
+
+
+def listened_to(systems):
+    """`gcs fly` without --arm in front of these vehicles: exit code, words, datagrams they were sent."""
+    port = free_port()
+    with closing(Vehicles(port)) as fleet:
+        process = start(GCS, "fly", "emergency", "--link", f"udpin:{HOST}:{port}", "--speed", "8")
+        while process.poll() is None:
+            fleet.beat(systems)
+            time.sleep(0.05)
+        fleet.listen()
+        out, err = process.communicate(timeout=20)
+        return process.returncode, out, err, fleet.received
+
+
+@pytest.mark.wall_clock
+def test_without_arm_nothing_at_all_is_sent():
+    code, out, err, received = listened_to(range(1, 7))
+    assert received == []
+    assert (code, out) == (0, "")
+    assert "heard: 1, 2, 3, 4, 5, 6; missing: none" in err
+
+
+@pytest.mark.wall_clock
+def test_without_arm_whoever_is_missing_is_named_and_the_exit_code_is_3():
+    code, _, err, received = listened_to((1, 2, 5))
+    assert received == []
+    assert code == 3
+    assert "heard: 1, 2, 5; missing: 3, 4, 6" in err
+
+
+@pytest.fixture
+def link():
+    """A link on a free port, for the first two vehicles, and its port; time goes a hundred times as fast."""
+    port = free_port()
+    live = Live([Connection("udpin", HOST, port)], (1, 2), speed=100)
+    yield live, port
+    live.close()
+
+
+def after(live, seconds):
+    """What has come when so much of its time has passed."""
+    live.sleep_until(live.now() + round(seconds * 1e9))
+    return live.receive()
+
+
+@pytest.mark.wall_clock
+def test_its_clock_goes_as_fast_as_it_was_told_and_waits_until_the_time_asked_for(link):
+    live, _ = link
+    before, wall = live.now(), time.monotonic()
+    live.sleep_until(before + 10**9)
+    assert live.now() >= before + 10**9
+    assert 0.01 <= time.monotonic() - wall < 0.1
+    live.sleep_until(before)  # has passed
+
+
+@pytest.mark.wall_clock
+def test_frames_have_the_time_at_which_they_came_and_strangers_are_not_heard(link):
+    live, port = link
+    with closing(Vehicles(port)) as fleet:
+        before = live.now()
+        fleet.beat((1, 2, 3))
+        frames = after(live, 1.0)
+    assert [frame.system for frame in frames] == [1, 2]
+    assert all(before <= frame.time_ns <= live.now() for frame in frames)
+    assert live.receive() == []
+
+
+@pytest.mark.wall_clock
+def test_what_is_sent_goes_to_where_the_vehicle_was_last_heard_and_before_that_nowhere(link):
+    live, port = link
+    live.send(1, b"lost")
+    assert live.unsent == 1
+    with closing(Vehicles(port)) as one, closing(Vehicles(port)) as other:
+        one.beat((1,))
+        other.beat((2,))
+        after(live, 1.0)
+        live.send(1, b"to one")
+        live.send(2, b"to the other")
+        other.beat((1,))  # vehicle 1 has moved behind another port
+        after(live, 1.0)
+        live.send(1, b"to its new place")
+        one.listen()
+        other.listen()
+        assert [data for data, _ in one.received] == [b"to one"]
+        assert [data for data, _ in other.received] == [b"to the other", b"to its new place"]
+    assert live.unsent == 1
+
+
+@pytest.mark.wall_clock
+def test_garbage_is_counted_and_does_not_hide_the_frames_behind_it(link):
+    live, port = link
+    with closing(Vehicles(port)) as fleet:
+        fleet._socket.sendto(b"\xfd\xff garbage", (HOST, port))
+        wrong = bytearray(Sender(1, 1).pack(dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3)))
+        wrong[-1] ^= 1
+        fleet._socket.sendto(bytes(wrong), (HOST, port))
+        fleet.beat((1,))
+        frames = after(live, 1.0)
+    assert [frame.system for frame in frames] == [1]
+    assert live.rejected >= 2
+
+
+def test_a_port_that_is_taken_gives_the_others_back():
+    free, taken = free_port(), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    with closing(taken):
+        taken.bind((HOST, 0))
+        busy = Connection("udpin", HOST, taken.getsockname()[1])
+        with pytest.raises(ConnectionRefused, match="in use"):
+            Live([Connection("udpin", HOST, free), busy], (1,))
+    Live([Connection("udpin", HOST, free), busy], (1,)).close()
