@@ -264,7 +264,8 @@ def _confirmed(yes: bool) -> bool:
     if not sys.stdin.isatty():
         _stderr().print("gcs: --arm without a terminal needs --yes", highlight=False)
         return False
-    if input("Rotors will turn. Type ARM to go on: ").strip() == "ARM":
+    _stderr().print("Rotors will turn. Type ARM to go on: ", end="")
+    if sys.stdin.readline().strip() == "ARM":
         return True
     _stderr().print("gcs: not armed", highlight=False)
     return False
