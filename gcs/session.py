@@ -7,6 +7,7 @@ import platform
 import time
 from collections.abc import Callable, Iterable
 from importlib.metadata import version
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -72,6 +73,7 @@ def output_folder(out: Path | None, name: str) -> Path:
     now = dt.datetime.now(dt.UTC).strftime("%Y%m%dT%H%M%S")
     folder = Path("runs") / f"{now}-{Path(name).stem}" if out is None else out
     try:
+        folder = _new(folder) if out is None else folder
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".writable"
         probe.touch()
@@ -79,6 +81,17 @@ def output_folder(out: Path | None, name: str) -> Path:
     except OSError as error:
         raise RecordingError(f"--out {folder}: cannot be written: {error.strerror or error}") from None
     return folder
+
+
+def _new(folder: Path) -> Path:
+    """This folder, or the first of its namesakes that nobody has: two runs may begin in one second."""
+    for candidate in chain([folder], (folder.with_name(f"{folder.name}-{number}") for number in count(2))):
+        try:
+            candidate.mkdir(parents=True)
+        except FileExistsError:
+            continue
+        return candidate
+    raise AssertionError("count() ends never")
 
 
 def _metadata(name: str, seed: int | None) -> dict[str, str]:
