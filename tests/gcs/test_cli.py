@@ -1,5 +1,7 @@
 """The `gcs` command as a person or a script meets it: words, exit codes, files, JSON."""
 
+import os
+import pty
 import re
 import resource
 import signal
@@ -14,6 +16,7 @@ from flights import GCS, SHORT, recorded, start
 
 from gcs import cli
 from gcs.replay import decide_again
+from gcs.session import output_folder
 
 CONTRACT = {
     "scenario", "controller", "trust", "severity", "seed", "heading_error_deg", "distance_to_target_m",
@@ -253,6 +256,34 @@ def test_without_out_a_run_is_put_in_a_folder_of_its_own(gcs, tmp_path, monkeypa
     (folder,) = (tmp_path / "runs").iterdir()
     assert re.fullmatch(r"\d{8}T\d{6}-demo", folder.name)
     assert orjson.loads(out)["recording"] == str(folder / "run.mcap")
+
+
+def test_two_runs_of_one_second_do_not_share_a_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folders = [output_folder(None, "demo") for _ in range(20)]
+    assert len(set(folders)) == 20
+    assert all(folder.is_dir() for folder in folders)
+
+
+@pytest.mark.parametrize(
+    ("typed", "said"), [("ARM\n", "in use"), ("arm\n", "not armed"), ("\n", "not armed"), ("\x04", "not armed")]
+)
+def test_on_a_terminal_arming_needs_the_word(tmp_path, typed, said):
+    """The port is taken, so that nothing flies even then."""
+    keyboard, terminal = pty.openpty()
+    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as taken:
+        taken.bind(("127.0.0.1", 0))
+        link = f"udpin:127.0.0.1:{taken.getsockname()[1]}"
+        process = start(GCS, "fly", "demo", "--link", link, "--arm", "--json", "--out", tmp_path, stdin=terminal)
+        os.write(keyboard, typed.encode())
+        out, err = process.communicate(timeout=20)
+    os.close(keyboard)
+    os.close(terminal)
+    assert process.returncode == 2
+    assert out == ""
+    assert "Type ARM" in err
+    assert said in err
+    assert "Traceback" not in err
 
 
 def helped(*python):
