@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
-from enum import Enum
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -19,8 +18,18 @@ from gcs.autopilots import Px4
 from gcs.beliefs import trust_source
 from gcs.commands import Beat, Command, SetVelocity
 from gcs.control import settings
+from gcs.flight_state import (
+    BEFORE_MISSION,
+    Asked,
+    Diagnosis,
+    FlightState,
+    Phase,
+    abandoned,
+    entered,
+    failed,
+)
 from gcs.gate import Limits, admit
-from gcs.swarm_frame import SwarmFrame, swarm_frame
+from gcs.swarm_frame import swarm_frame
 from gcs.telemetry import Swarm
 from scenarios import Scenario, offsets_ne
 from trustr.controller import Decision, Observation, decide
@@ -45,82 +54,6 @@ HEIGHT_GAIN, CLIMB_SPEED = 0.8, 1.0
 """1/s and m/s: altitude is held apart from the consensus."""
 RUN_UP_GAIN, RUN_UP_CAP = 0.5, 0.5
 """1/s and m/s: every robot to its place beside the moving origin."""
-
-
-class Phase(Enum):
-    """What the flight is about."""
-
-    JOIN = "joining"
-    CLIMB = "taking off"
-    TAKE_CONTROL = "taking control"
-    RUN_UP = "running up"
-    MISSION = "mission"
-    LAND = "landing"
-    DONE = "done"
-
-
-BEFORE_MISSION = (Phase.CLIMB, Phase.TAKE_CONTROL, Phase.RUN_UP)
-"""In the air already: without one of them the mission cannot begin, so all come down."""
-
-
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """What one vehicle was last asked for, and when."""
-
-    commands: tuple[Command, ...] = ()
-    tick: int = 0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FlightState:
-    """Everything that changes."""
-
-    tick: int
-    """The tick to be decided next."""
-    phase: Phase
-    phase_tick: int
-    """The phase's first tick."""
-    asked: tuple[Asked, ...]
-    """(N) what each vehicle was last asked for, so that asking again can wait."""
-    sent_ned: Array
-    """(N, 3) m/s: the set-points sent last."""
-    frame: SwarmFrame | None = None
-    """None until every vehicle has told where it is."""
-    shift_ne: Array | None = None
-    """(N, 2) m: add to a position in a vehicle's own frame, get the swarm's."""
-    mission_tick: int | None = None
-    problem: str | None = None
-    """Why the flight could not be completed."""
-
-    @property
-    def done(self) -> bool:
-        """Nothing is left to decide."""
-        return self.phase is Phase.DONE
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Diagnosis:
-    """What a tick decided, and from what."""
-
-    phase: Phase
-    mission_s: float
-    """Since mission start; NaN before."""
-    task: str
-    virtual: VirtualLeader | None
-    trust: Array
-    """(N,)"""
-    decision: Decision | None
-    """None outside the mission."""
-    position_ne: Array
-    """(N, 2) m in the swarm's frame; NaN until that is known."""
-    asked_ned: Array | None = None
-    """(N, 3) m/s that the controller wanted; None where no set-points flow."""
-    sent_ned: Array | None = None
-    """(N, 3) m/s after the gate."""
-    verdict: npt.NDArray[np.int8] | None = None
-    """(N,) of the gate."""
-    commanded: npt.NDArray[np.bool_] | None = None
-    """(N,) whom a set-point was sent to."""
 
 
 Step = tuple[FlightState, Commands, Diagnosis]
@@ -160,7 +93,7 @@ class Flight:
     def __call__(self, state: FlightState, swarm: Swarm, events: Iterable[str], now_ns: int) -> Step:
         """One tick. events: what an operator asked for since the last; "land" ends the flight."""
         if "land" in events and state.phase not in (Phase.LAND, Phase.DONE):
-            state = _abandoned(state)
+            state = abandoned(state)
         state = self._watch(state, swarm, now_ns)
         state, commands, diagnosis = self._phases[state.phase](state, swarm, now_ns)
         if state.tick % self.scenario.time.ticks(1.0) == 0:
@@ -173,14 +106,14 @@ class Flight:
         in_phase_s = (state.tick - state.phase_tick) * self._period_s
         if state.phase is Phase.LAND:
             if in_phase_s > LANDING_S:
-                return _failed(state, f"not every vehicle landed within {LANDING_S:g} s", Phase.DONE)
+                return failed(state, f"not every vehicle landed within {LANDING_S:g} s", Phase.DONE)
         elif state.tick * self._period_s > timeout_s and state.phase is not Phase.DONE:
             problem = f"the flight took longer than time.timeout_s = {timeout_s:g} s"
-            return _failed(_abandoned(state), problem, Phase.LAND)
+            return failed(abandoned(state), problem, Phase.LAND)
         elif state.phase in BEFORE_MISSION:
             silent = ~swarm.fresh(now_ns, within_ns=LOST_NS)
             if silent.any():
-                return _failed(state, _fell_silent(swarm, silent, state.phase), Phase.LAND)
+                return failed(state, _fell_silent(swarm, silent, state.phase), Phase.LAND)
         return state
 
     def _join(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
@@ -190,11 +123,11 @@ class Flight:
             ahead = self.plan.segments[0].velocity_ne / self.scenario.mission.cruise_m_s
             frame = swarm_frame(swarm.origin, swarm.position_ned[:, :2], offset, run_up_m * ahead)
             shift = frame.to_ne(swarm.origin[:, 0], swarm.origin[:, 1])
-            return self._climb(replace(_enter(state, Phase.CLIMB), frame=frame, shift_ne=shift), swarm, now_ns)
+            return self._climb(replace(entered(state, Phase.CLIMB), frame=frame, shift_ne=shift), swarm, now_ns)
         if (state.tick - state.phase_tick) * self._period_s > JOIN_S:
             names = ", ".join(map(str, missing))
             problem = f"vehicle {names} was not heard, or not ready to arm, within {JOIN_S:g} s"
-            return self._land(_failed(state, problem, Phase.DONE), swarm, now_ns)
+            return self._land(failed(state, problem, Phase.DONE), swarm, now_ns)
         return self._ask(
             state,
             swarm,
@@ -207,7 +140,7 @@ class Flight:
 
     def _climb(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
         if all(self._autopilot.hovering(swarm, row) for row in range(len(swarm.ids))):
-            return self._take_control(_enter(state, Phase.TAKE_CONTROL), swarm, now_ns)
+            return self._take_control(entered(state, Phase.TAKE_CONTROL), swarm, now_ns)
         return self._ask(state, swarm, lambda row: _some(self._autopilot.next_to_fly(swarm, row)))
 
     def _take_control(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
@@ -215,7 +148,7 @@ class Flight:
         height_error = np.abs(swarm.position_ned[:, 2] + self.scenario.swarm.altitude_m)
         hovering = (np.linalg.norm(swarm.velocity_ned, axis=1) < STILL) & (height_error < LEVEL)
         if streaming_s > STREAM_FIRST_S and self._autopilot.obeying(swarm).all() and hovering.all():
-            return self._run_up(_enter(state, Phase.RUN_UP), swarm, now_ns)
+            return self._run_up(entered(state, Phase.RUN_UP), swarm, now_ns)
         ask: Commands = []
         if streaming_s >= STREAM_FIRST_S:
             state, ask, _ = self._ask(state, swarm, lambda row: _some(self._autopilot.next_to_obey(swarm, row)))
@@ -228,7 +161,7 @@ class Flight:
         """Bring the formation to cruise: time 0 finds it where the first leg begins, each robot in its place."""
         into = state.tick - state.phase_tick
         if into >= self._run_up_ticks:
-            state = replace(_enter(state, Phase.MISSION), mission_tick=state.tick)
+            state = replace(entered(state, Phase.MISSION), mission_tick=state.tick)
             return self._mission(state, swarm, now_ns)
         cruise = self.scenario.mission.cruise_m_s
         ahead = self.plan.segments[0].velocity_ne / cruise
@@ -243,7 +176,7 @@ class Flight:
     def _mission(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
         time_s = self._mission_s(state)
         if time_s >= self.plan.read_out_s - 1e-9:
-            state = _enter(state, Phase.LAND)
+            state = entered(state, Phase.LAND)
             return self._land(state, swarm, now_ns)
         obeying = self._autopilot.obeying(swarm)
         state = self._note_the_lost(state, swarm, obeying, now_ns)
@@ -260,7 +193,7 @@ class Flight:
         if not (swarm.armed & heard).any() and state.phase is not Phase.DONE:
             unseen = swarm.armed & ~heard
             problem = _fell_silent(swarm, unseen, state.phase) if unseen.any() else None
-            state = replace(_enter(state, Phase.DONE), problem=state.problem or problem)
+            state = replace(entered(state, Phase.DONE), problem=state.problem or problem)
         return self._ask(
             state,
             swarm,
@@ -357,20 +290,6 @@ class Flight:
             return 0.0
         run_up_s = self.scenario.mission.run_up_s
         return mission.run_up(self.scenario.mission.cruise_m_s, run_up_s, ticks * self._period_s)[0]
-
-
-def _enter(state: FlightState, phase: Phase) -> FlightState:
-    """The first tick of a phase; nobody has been asked for anything in it."""
-    return replace(state, phase=phase, phase_tick=state.tick, asked=(Asked(),) * len(state.asked))
-
-
-def _abandoned(state: FlightState) -> FlightState:
-    """Land before the mission is over: its clock stops, so that nobody scores what the landing does."""
-    return replace(_enter(state, Phase.LAND), mission_tick=None)
-
-
-def _failed(state: FlightState, problem: str, phase: Phase) -> FlightState:
-    return replace(_enter(state, phase), problem=state.problem or problem)
 
 
 def _fell_silent(swarm: Swarm, silent: npt.NDArray[np.bool_], phase: Phase) -> str:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Protocol
 
-from gcs.flight import Diagnosis, Flight, FlightState
+from gcs.flight import Flight
+from gcs.flight_state import Diagnosis, FlightState
 from gcs.messages import Encoder
 from gcs.telemetry import Swarm, observe
 from wire.frames import Frame

@@ -13,7 +13,8 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from gcs.flight import Flight, Phase
+from gcs.flight import Flight
+from gcs.flight_state import Phase
 from gcs.loop import Tick
 from wire.modes import px4_mode_name
 

@@ -9,15 +9,15 @@ from collections.abc import Callable, Iterable
 from importlib.metadata import version
 from itertools import chain, count
 from pathlib import Path
-from typing import Any
 
-from gcs.flight import Flight, FlightState
+from gcs.flight import Flight
+from gcs.flight_state import FlightState
 from gcs.loop import Clock, Link, Record, fly
 from gcs.operator import Operator
 from gcs.recording.writer import Recorder, RecordingError, Tap
-from gcs.scoring import Score, score
+from gcs.scoring import score
 from gcs.summary import Summary, collision, severity_of, trust_of
-from gcs.track import Tracker
+from gcs.track import Track, Tracker
 from gcs.truth import Truth
 from scenarios import Scenario
 
@@ -55,10 +55,8 @@ def flown(
             period_ns=scenario.time.period_ns,
             events=operator.events,
         )
-        result = None if tracker.track is None else score(tracker.track, scenario)
         took_s = time.perf_counter() - began
-        summary = _summary(name, scenario, state, result, seed, took_s, (out / RECORDING).resolve())
-        summary = _with(summary, scored_on="telemetry" if tracker.track and tracker.track.measured else "truth")
+        summary = _summary(name, scenario, state, tracker.track, seed, took_s, (out / RECORDING).resolve())
         recorder.add_metadata("summary", {"json": summary.json().decode()})
     summary.save(out)
     if tracker.track is not None:
@@ -117,11 +115,12 @@ def _summary(
     name: str,
     scenario: Scenario,
     state: FlightState,
-    result: Score | None,
+    track: Track | None,
     seed: int | None,
     took_s: float,
     recording: Path,
 ) -> Summary:
+    result = None if track is None else score(track, scenario)
     simulated_s = state.tick * scenario.time.period_s
     problem = state.problem or collision(result)
     return Summary(
@@ -140,12 +139,6 @@ def _summary(
         real_time_factor=round(simulated_s / took_s, 2),
         recording=str(recording),
         profile=scenario.control.profile,
-        scored_on="truth",
+        scored_on="telemetry" if track is not None and track.measured else "truth",
         problem=problem,
     )
-
-
-def _with(summary: Summary, **changes: Any) -> Summary:
-    from dataclasses import replace
-
-    return replace(summary, **changes)
