@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from gcs.commands import Arm, Beat, ChangeMode, Land, RequestMessage, RequestStream, SetVelocity, TakeOff
-from gcs.flight import JOIN_S, LANDING_S, Flight, Phase
+from gcs.flight import JOIN_S, LANDING_S, Flight
+from gcs.flight_state import Phase
 from gcs.telemetry import Swarm
 from scenarios import load
 from wire.modes import PX4_MODES
