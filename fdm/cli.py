@@ -7,7 +7,7 @@ import signal
 import sys
 from typing import Annotated, Literal
 
-from cyclopts import App, Parameter
+from cyclopts import App, CycloptsError, Parameter
 
 app = App(name="fdm", help="Fly a scenario's vehicles in JSBSim, each behind a MAVLink endpoint.", version="0.1.0")
 
@@ -94,6 +94,9 @@ def _say(words: str) -> None:
 def main() -> None:
     """Entry point."""
     try:
-        sys.exit(app())
+        code = app(sys.argv[1:], exit_on_error=False, print_error=False, result_action="return_value")
+    except CycloptsError as error:
+        code = _refuse(str(error))
     except KeyboardInterrupt:
-        sys.exit(130)
+        code = 130
+    sys.exit(code)

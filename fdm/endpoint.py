@@ -11,11 +11,12 @@ from pymavlink.dialects.v20 import common as dialect
 from fdm import modes
 from fdm.modes import Failsafe, Mode, Outcome, Pilot, Setpoint, Situation
 from fdm.personality import PX4, Personality
-from fdm.streams import Schedule
+from fdm.streams import NEVER, Schedule
 from fdm.surroundings import PERIOD_S, Surroundings
-from fdm.telemetry import AUTOPILOT, Reporter
-from fdm.vehicle import Geodetic, Vehicle
+from fdm.telemetry import Reporter
+from fdm.vehicle import FlightModelDiverged, Geodetic, Vehicle
 from wire.frames import Frame, Framer, decode
+from wire.ids import AUTOPILOT
 from wire.payloads import SET_POSITION_TARGET_LOCAL_NED, PositionTarget, unpack_position_target
 
 GUIDANCE, WATCHDOG, TRUTH = -3, -2, -1
@@ -62,6 +63,8 @@ class Endpoint:
         self.framer = Framer()
         self.refused_setpoints = 0
         """Set-points that named a frame or a mask we do not fly, or a number that is none."""
+        self.lost = False
+        """The flight model diverged: from now on the vehicle is silent, and the others fly on."""
         self.first_motion_step: int | None = None
         """Step at which the vehicle was first asked to move sideways from outside."""
         self._surroundings = surroundings
@@ -112,10 +115,12 @@ class Endpoint:
     @property
     def next_event_step(self) -> int:
         """The next step at which there is something to do or to send."""
-        return self._schedule.next_step
+        return NEVER if self.lost else self._schedule.next_step
 
     def receive(self, datagram: bytes) -> None:
         """Take in what came over the link, now."""
+        if self.lost:
+            return
         for frame in self.framer.frames(0, datagram):
             if frame.message == SET_POSITION_TARGET_LOCAL_NED:
                 self._position_target(unpack_position_target(frame.payload))
@@ -126,8 +131,12 @@ class Endpoint:
         """Fly this many physics steps, in bursts from one thing that is due to the next."""
         vehicle, schedule = self.vehicle, self._schedule
         target = vehicle.steps + steps
-        while vehicle.steps < target:
-            vehicle.step(min(target, schedule.next_step) - vehicle.steps)
+        while vehicle.steps < target and not self.lost:
+            try:
+                vehicle.step(min(target, schedule.next_step) - vehicle.steps)
+            except FlightModelDiverged:
+                self.lost, self._pilot = True, Pilot()
+                return
             if vehicle.steps >= schedule.next_step:
                 self._serve(schedule.take_due(vehicle.steps))
 

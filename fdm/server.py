@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import selectors
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Literal
 
@@ -48,11 +47,6 @@ class Server:
             self._selector.register(port, selectors.EVENT_READ)
         self.behind_s = 0.0
         """Simulated seconds by which physics lags the clock."""
-
-    def serve(self, until: Callable[[], bool]) -> None:
-        """Go on until told to stop."""
-        while not until():
-            self.turn()
 
     def turn(self) -> None:
         """Wait for a datagram or for something to be due, let physics catch up, deliver, send."""

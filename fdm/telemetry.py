@@ -11,6 +11,7 @@ from fdm.modes import READY_AFTER, Mode, Pilot, Severity, Situation
 from fdm.personality import Personality
 from fdm.vehicle import Geodetic, Vehicle
 from wire.frames import Sender
+from wire.ids import AUTOPILOT, TRUTH
 from wire.payloads import (
     LOCAL_POSITION_NED,
     SIM_STATE,
@@ -19,9 +20,6 @@ from wire.payloads import (
     pack_local_position,
     pack_sim_state,
 )
-
-AUTOPILOT, TRUTH = 1, 200
-"""Component ids: the autopilot, and the one that only recorder, scorer and report read."""
 
 SENSORS = (
     dialect.MAV_SYS_STATUS_SENSOR_3D_GYRO

@@ -25,13 +25,16 @@ app = App(
 FLOWN, BAD_INPUT, NOT_COMPLETED, INTERRUPTED = 0, 2, 3, 130
 """Exit codes."""
 
-LIVE_POSITIONS = "time.positions_per_tick=5"
-"""Real links deliver at any moment of a tick: asked once a tick, a flight ends 0.5 m from its lockstep twin."""
+LIVE_POSITIONS = 5
+"""A tick: real links deliver at any moment of it; asked once, a flight ended 0.5 m from its lockstep twin."""
 
 ScenarioName = Annotated[str, Parameter(help="A scenario's name (see `gcs scenarios`), or the path of a TOML file.")]
-Out = Annotated[Path | None, Parameter(help="Folder for run.mcap, summary.json and trajectory.png.")]
-AsJson = Annotated[bool, Parameter(name="--json", negative=(), help="One JSON object on stdout.")]
-Yes = Annotated[bool, Parameter(negative=(), help="Do not ask before arming.")]
+Out = Annotated[
+    Path | None,
+    Parameter(help="Folder for run.mcap, summary.json and trajectory.png; runs/<time>-<scenario> if absent."),
+]
+AsJson = Annotated[bool, Parameter(name="--json", negative=(), show_default=False, help="One JSON object on stdout.")]
+Yes = Annotated[bool, Parameter(negative=(), show_default=False, help="Do not ask before arming.")]
 
 
 @Parameter(name="*")
@@ -44,29 +47,38 @@ class Choices:
     ] = None
     trust: Annotated[Literal["truth", "ratings"] | None, Parameter(help="Where trust comes from.")] = None
     severity: Annotated[
-        float | None, Parameter(help="Speed left to degraded motors, of cruise: the paper flies 0.4 and 0.7.")
+        float | None, Parameter(help="Speed left to degraded motors, 0 to 1 of cruise: the paper flies 0.4 and 0.7.")
     ] = None
-    no_fault: Annotated[bool, Parameter(negative=(), help="Fly with everything healthy.")] = False
+    no_fault: Annotated[bool, Parameter(negative=(), show_default=False, help="Fly with everything healthy.")] = False
     set_: Annotated[
         tuple[str, ...],
-        Parameter(name="--set", negative=(), help="section.key=value; changes one key of the scenario. Repeatable."),
+        Parameter(
+            name="--set",
+            negative=(),
+            show_default=False,
+            help="section.key=value; changes one key of the scenario. Repeatable.",
+        ),
     ] = ()
 
-    def scenario(self, name: str, *preset: str) -> Scenario:
-        """The scenario as chosen; presets are overrides that --set comes after. Raises ScenarioError."""
-        from scenarios import ScenarioError, load
+    def scenario(self, name: str) -> Scenario:
+        """The scenario as chosen. Raises ScenarioError and BadUsageError."""
+        from scenarios import MotorDegradation, load
 
-        overrides = [*preset, *self.set_]
+        overrides = list(self.set_)
         if self.controller is not None:
             overrides.append(f'control.rule="{self.controller}"')
         if self.trust is not None:
             overrides.append(f'trust.source="{self.trust}"')
         loaded = load(name, overrides=overrides)
-        if self.severity is not None and not 0 <= self.severity <= 1:
-            raise ScenarioError(f"--severity {self.severity}: must be 0 to 1, the fraction of cruise that is left")
         if self.no_fault:
-            return loaded.without_faults()
-        return loaded if self.severity is None else loaded.with_severity(self.severity)
+            loaded = loaded.without_faults()
+        if self.severity is None:
+            return loaded
+        if not 0 <= self.severity <= 1:
+            raise BadUsageError(f"--severity {self.severity}: must be 0 to 1, the fraction of cruise that is left")
+        if not any(isinstance(fault, MotorDegradation) for fault in loaded.fault):
+            raise BadUsageError(f"--severity {self.severity}: there is no degraded motor in this flight")
+        return loaded.with_severity(self.severity)
 
 
 @app.command
@@ -82,7 +94,10 @@ def run(
     """Fly a scenario in simulation, as fast as it goes, and record it."""
 
     def command() -> int:
-        from gcs.lockstep import Lockstep
+        try:
+            from gcs.lockstep import Lockstep
+        except ModuleNotFoundError as error:
+            raise BadUsageError(f"run simulates, and needs {error.name}, which is not installed") from None
 
         _check_seed(seed)
         chosen = choices.scenario(scenario)
@@ -104,7 +119,9 @@ def fly(
             negative=(), help="udpin:HOST:PORT or udpout:HOST:PORT; repeatable, PORT may be a range 14550-14555."
         ),
     ],
-    arm: Annotated[bool, Parameter(negative=(), help="Arm and fly; without it, only listen.")] = False,
+    arm: Annotated[
+        bool, Parameter(negative=(), show_default=False, help="Arm and fly; without it, only listen.")
+    ] = False,
     yes: Yes = False,
     speed: Annotated[float, Parameter(help="The vehicles' seconds a second, as `fdm serve --speed`.")] = 1.0,
     seed: Annotated[int | None, Parameter(help="Of `fdm serve`, for the record.")] = None,
@@ -121,14 +138,14 @@ def fly(
         _check_seed(seed)
         if not 0.0 < speed < math.inf:
             raise BadUsageError(f"--speed {speed}: must be a number above 0")
-        chosen = choices.scenario(scenario, LIVE_POSITIONS)
+        chosen = choices.scenario(scenario).asking(LIVE_POSITIONS)
         connections = [connection for text in link for connection in parse(text)]
         if arm and not _confirmed(yes):
             return BAD_INPUT
         live = Live(connections, range(1, chosen.swarm.count + 1), speed=speed)
         try:
             if not arm:
-                return listen(live, chosen, console=_stderr())
+                return listen(live, chosen, as_json=json, say=_say)
             return _fly(scenario, chosen, live, live, seed=seed, out=out, json=json)
         finally:
             live.close()
@@ -155,7 +172,7 @@ def reproduce(
     """Fly the paper's eight conditions over many seeds, and the recommended profile beside them."""
 
     def command() -> int:
-        from gcs.reproduce import conditions
+        from gcs.reproduce import FlightNotCompleted, conditions
         from gcs.reproduce import reproduce as fly_all
         from gcs.session import output_folder
 
@@ -164,13 +181,17 @@ def reproduce(
         if jobs == 0:
             raise BadUsageError("--jobs 0: must be a number of processes, or -1 for one a core")
         folder = output_folder(out, "reproduce")
-        result = fly_all(conditions(), seeds=seeds, jobs=jobs, console=_stderr())
+        try:
+            result = fly_all(conditions(), seeds=seeds, jobs=jobs, console=_stderr())
+        except FlightNotCompleted as error:
+            _say(f"gcs: {error}")
+            return NOT_COMPLETED
         result.save(folder)
         if json:
             _write(result.json())
         else:
             result.show(_stdout())
-            _stderr().print(f"written: {folder}/reproduce.json, {folder}/reproduce.md", highlight=False, soft_wrap=True)
+            _say(f"written: {folder}/reproduce.json, {folder}/reproduce.md")
         return FLOWN
 
     return _guarded(command)
@@ -178,7 +199,7 @@ def reproduce(
 
 @app.command
 def compare(
-    *recordings: Annotated[Path, Parameter(help="run.mcap files, or the folders they are in.")],
+    *recordings: Annotated[Path, Parameter(name="RECORDING", help="run.mcap files, or the folders they are in.")],
     out: Annotated[Path, Parameter(help="The picture.")] = Path("comparison.png"),
 ) -> int:
     """Put flights side by side: a table, and one picture on one scale."""
@@ -194,19 +215,19 @@ def compare(
 
 @app.command
 def replay(
-    recording: Path,
+    recording: Annotated[Path, Parameter(help="A run.mcap, or the folder it is in.")],
     /,
     *,
-    verify: Annotated[bool, Parameter(negative=(), help="Decide again and compare every set-point.")],
+    verify: Annotated[
+        bool, Parameter(negative=(), help="Decide again and compare; so far all that replay does.")
+    ] = True,
 ) -> int:
-    """Decide a recorded flight again from its frames."""
+    """Decide a recorded flight again from its frames, and compare every frame it would send."""
 
     def command() -> int:
         from gcs.replay import verify as decide_again
 
-        if not verify:
-            raise BadUsageError("replay: for now only --verify")
-        return decide_again(recording, console=_stdout())
+        return decide_again(recording, console=_stdout()) if verify else FLOWN
 
     return _guarded(command)
 
@@ -219,12 +240,15 @@ def _fly(
 
     from gcs.operator import Operator
     from gcs.progress import Display
-    from gcs.session import flown, output_folder
+    from gcs.session import flown, make_room, output_folder
 
     folder = output_folder(out, name)
+    earlier = make_room(folder)
+    if earlier is not None:
+        _say(f"an earlier recording is kept as {earlier}")
     console = _stderr()
     with ExitStack() as stack:
-        operator = stack.enter_context(Operator(lambda words: console.print(words, highlight=False)))
+        operator = stack.enter_context(Operator(lambda words: console.print(words, highlight=False, markup=False)))
 
         def watching(flight: Any) -> tuple[Display]:
             return (stack.enter_context(Display(flight, console, title=Path(name).stem)),)
@@ -241,15 +265,14 @@ def _report(summary: Summary, folder: Path, *, json: bool) -> None:
     from gcs.words import verdict
 
     if summary.problem is not None:
-        _stderr().print(f"gcs: {summary.problem}", highlight=False, soft_wrap=True)
+        _say(f"gcs: {summary.problem}")
     if json:
         _write(summary.json())
         return
-    console = _stdout()
-    console.print(verdict(summary), highlight=False)
-    console.print(f"recording  {summary.recording}", highlight=False, soft_wrap=True)
+    lines = [verdict(summary), f"recording  {summary.recording}"]
     if (folder / PICTURE).exists():
-        console.print(f"picture    {(folder / PICTURE).resolve()}", highlight=False, soft_wrap=True)
+        lines.append(f"picture    {(folder / PICTURE).resolve()}")
+    sys.stdout.write("\n".join(lines) + "\n")
 
 
 def _check_seed(seed: int | None) -> None:
@@ -262,12 +285,13 @@ def _confirmed(yes: bool) -> bool:
     if yes:
         return True
     if not sys.stdin.isatty():
-        _stderr().print("gcs: --arm without a terminal needs --yes", highlight=False)
+        _say("gcs: --arm without a terminal needs --yes")
         return False
-    _stderr().print("Rotors will turn. Type ARM to go on: ", end="")
+    sys.stderr.write("Rotors will turn. Type ARM to go on: ")
+    sys.stderr.flush()
     if sys.stdin.readline().strip() == "ARM":
         return True
-    _stderr().print("gcs: not armed", highlight=False)
+    _say("gcs: not armed")
     return False
 
 
@@ -282,7 +306,7 @@ def _guarded(command: Callable[[], int]) -> int:
     except Exception as error:
         if not isinstance(error, _refusals()):
             raise
-        _stderr().print(f"gcs: {error}", highlight=False, soft_wrap=True, markup=False)
+        _say(f"gcs: {error}")
         return BAD_INPUT
 
 
@@ -299,6 +323,12 @@ def _refusals() -> tuple[type[Exception], ...]:
 
 def _write(line: bytes) -> None:
     sys.stdout.write(line.decode() + "\n")
+
+
+def _say(words: str) -> None:
+    """On stderr, where progress and words go."""
+    sys.stderr.write(words + "\n")
+    sys.stderr.flush()
 
 
 def _stdout() -> Any:

@@ -8,10 +8,12 @@ from typing import Any
 
 from rich import box
 from rich.table import Table
+from rich.text import Text
 
 from gcs.recording.reader import Flown, UnreadableRecording, read
-from gcs.scoring import score
+from gcs.scoring import Score, score
 from gcs.session import RECORDING
+from gcs.words import faults
 
 FORMATS = (".png", ".pdf", ".svg")
 
@@ -29,15 +31,16 @@ def compare(recordings: Sequence[Path], *, picture: Path, console: Any) -> None:
     flights = [read(path / RECORDING if path.is_dir() else path) for path in recordings]
     console.print(_table(flights))
     for flight in flights:
-        console.print(f"recording  {flight.path.resolve()}", highlight=False, soft_wrap=True)
+        console.print(f"recording  {flight.path.resolve()}", highlight=False, soft_wrap=True, markup=False)
     _draw(flights, picture)
-    console.print(f"picture    {picture.resolve()}", highlight=False, soft_wrap=True)
+    console.print(f"picture    {picture.resolve()}", highlight=False, soft_wrap=True, markup=False)
 
 
 def _table(flights: Sequence[Flown]) -> Table:
     from gcs.picture import controller_name
 
-    table = Table(title=flights[0].scenario.title, title_justify="left", title_style="bold", box=box.SIMPLE)
+    title = Text(flights[0].scenario.title, style="bold")
+    table = Table(title=title, title_justify="left", box=box.SIMPLE)
     table.add_column("")
     for flight in flights:
         table.add_column(controller_name(flight.scenario), justify="right")
@@ -50,16 +53,24 @@ def _table(flights: Sequence[Flown]) -> Table:
     )
     for words, name, form in rows:
         table.add_row(words, *("–" if s is None else form.format(getattr(s, name)) for s in scores))
-    verdicts = ("no score" if s is None else "[green]passed[/]" if s.passed else "[red]failed[/]" for s in scores)
-    table.add_row("mission", *verdicts)
+    table.add_row("what goes wrong", *(Text(", ".join(faults(flight.scenario)) or "nothing") for flight in flights))
+    table.add_row("mission", *map(_verdict, flights, scores))
     return table
+
+
+def _verdict(flight: Flown, result: Score | None) -> Text:
+    if flight.problem is not None:
+        return Text(f"not completed: {flight.problem}", style="red")
+    if result is None:
+        return Text("no score", style="red")
+    return Text("passed", style="green") if result.passed else Text("failed", style="red")
 
 
 def _draw(flights: Sequence[Flown], picture: Path) -> None:
     from gcs.picture import Panel, controller_name, draw_side_by_side
 
     panels = [
-        Panel(controller_name(flight.scenario), flight.track, flight.scenario)
+        Panel(controller_name(flight.scenario), flight.track, flight.scenario, flight.problem)
         for flight in flights
         if flight.track is not None
     ]

@@ -52,6 +52,10 @@ STILL, LEVEL = 0.15, 0.2
 """m/s and m: the fleet hovers in formation, and the run-up may begin."""
 HEIGHT_GAIN, CLIMB_SPEED = 0.8, 1.0
 """1/s and m/s: altitude is held apart from the consensus."""
+DOWN_BELOW = 0.25
+"""Of the altitude to be held: a vehicle lower than that in a mission has come down."""
+TOLD_S = 2.0
+"""A heartbeat is a second apart: what it says is believed this long after it may have changed."""
 RUN_UP_GAIN, RUN_UP_CAP = 0.5, 0.5
 """1/s and m/s: every robot to its place beside the moving origin."""
 
@@ -70,7 +74,7 @@ class Flight:
         self._offset_ne = offsets_ne(scenario)
         self._trust = trust_source(scenario)
         self._leader = mission.PROFILES[scenario.control.profile]
-        position_s = scenario.time.period_s / scenario.time.positions_per_tick
+        position_s = scenario.time.period_s / (scenario.time.positions_per_tick or 1)
         self._autopilot = Px4(height_m=scenario.swarm.altitude_m, position_s=position_s)
         self._limits = Limits(scenario.limits.speed_m_s, scenario.limits.acceleration_m_s2)
         self._period_s = scenario.time.period_s
@@ -125,8 +129,8 @@ class Flight:
             shift = frame.to_ne(swarm.origin[:, 0], swarm.origin[:, 1])
             return self._climb(replace(entered(state, Phase.CLIMB), frame=frame, shift_ne=shift), swarm, now_ns)
         if (state.tick - state.phase_tick) * self._period_s > JOIN_S:
-            names = ", ".join(map(str, missing))
-            problem = f"vehicle {names} was not heard, or not ready to arm, within {JOIN_S:g} s"
+            verb = "was" if len(missing) == 1 else "were"
+            problem = f"{_vehicles(missing)} {verb} not heard, or not ready to arm, within {JOIN_S:g} s"
             return self._land(failed(state, problem, Phase.DONE), swarm, now_ns)
         return self._ask(
             state,
@@ -181,16 +185,18 @@ class Flight:
         obeying = self._autopilot.obeying(swarm)
         state = self._note_the_lost(state, swarm, obeying, now_ns)
         diagnosis = self._overview(state, swarm)
-        heard = obeying & swarm.fresh(now_ns, within_ns=STALE_NS)
+        flying = obeying & ~self._down(swarm)
+        heard = flying & swarm.fresh(now_ns, within_ns=STALE_NS)
         observation = Observation(diagnosis.position_ne, swarm.velocity_ned[:, :2], heard, diagnosis.trust)
         assert diagnosis.virtual is not None
         decision = decide(observation, diagnosis.virtual, self._settings)
-        commanded = obeying & swarm.fresh(now_ns, within_ns=LOST_NS)
+        commanded = flying & swarm.fresh(now_ns, within_ns=LOST_NS)
         return self._steer(state, swarm, decision.velocity_ne, diagnosis, decision, commanded)
 
     def _land(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
         heard = swarm.fresh(now_ns, within_ns=LOST_NS)
-        if not (swarm.armed & heard).any() and state.phase is not Phase.DONE:
+        told = (state.tick - state.phase_tick) * self._period_s >= TOLD_S
+        if told and not (swarm.armed & heard).any() and state.phase is not Phase.DONE:
             unseen = swarm.armed & ~heard
             problem = _fell_silent(swarm, unseen, state.phase) if unseen.any() else None
             state = replace(entered(state, Phase.DONE), problem=state.problem or problem)
@@ -268,19 +274,26 @@ class Flight:
     def _note_the_lost(
         self, state: FlightState, swarm: Swarm, obeying: npt.NDArray[np.bool_], now_ns: int
     ) -> FlightState:
-        """The first vehicle to fall silent, or to leave our mode, leaves the flight incomplete; the others fly on."""
+        """The first vehicle to fall silent, to come down or to leave our mode is why the flight is incomplete."""
         if state.problem is not None:
             return state
         silent = ~swarm.fresh(now_ns, within_ns=LOST_NS)
-        if obeying.all() and not silent.any():
+        down = self._down(swarm)
+        if obeying.all() and not (silent | down).any():
             return state
         when = f"{self._mission_s(state):.1f} s into the mission"
         for row, system in enumerate(swarm.ids):
             if silent[row]:
                 return replace(state, problem=f"vehicle {system} fell silent {when}")
+            if down[row]:
+                return replace(state, problem=f"vehicle {system} came down {when}")
             if not obeying[row]:
                 return replace(state, problem=f"vehicle {system} left the ground station's control {when}")
         return state
+
+    def _down(self, swarm: Swarm) -> npt.NDArray[np.bool_]:
+        """(N,) who is near the ground; False where nothing is known."""
+        return np.asarray(-swarm.position_ned[:, 2] < DOWN_BELOW * self.scenario.swarm.altitude_m)
 
     def _mission_s(self, state: FlightState) -> float:
         return math.nan if state.mission_tick is None else (state.tick - state.mission_tick) * self._period_s
@@ -293,8 +306,12 @@ class Flight:
 
 
 def _fell_silent(swarm: Swarm, silent: npt.NDArray[np.bool_], phase: Phase) -> str:
-    names = ", ".join(str(system) for system, mute in zip(swarm.ids, silent, strict=True) if mute)
-    return f"vehicle {names} fell silent while {phase.value}"
+    mute = [system for system, is_mute in zip(swarm.ids, silent, strict=True) if is_mute]
+    return f"{_vehicles(mute)} fell silent while {phase.value}"
+
+
+def _vehicles(systems: list[int]) -> str:
+    return f"{'vehicle' if len(systems) == 1 else 'vehicles'} {', '.join(map(str, systems))}"
 
 
 def _some(command: Command | None) -> tuple[Command, ...]:

@@ -8,6 +8,7 @@ from typing import Any
 import orjson
 
 from gcs.mission import plan
+from gcs.words import faults
 from scenarios import find, load, names
 
 
@@ -22,7 +23,7 @@ def listing(*, as_json: bool, console: Any) -> int:
                 "title": scenario.title,
                 "vehicles": scenario.swarm.count,
                 "duration_s": round(plan(scenario).read_out_s, 3),
-                "faults": [f"{fault.kind} of vehicle {fault.vehicle}" for fault in scenario.fault],
+                "faults": faults(scenario),
                 "path": str(find(name)),
             }
         )
@@ -35,7 +36,7 @@ def listing(*, as_json: bool, console: Any) -> int:
     for column in ("name", "what is flown", "UAVs", "mission", "fault"):
         table.add_column(column)
     for row in rows:
-        faults = ", ".join(row["faults"]) or "none"
-        table.add_row(row["name"], row["title"], str(row["vehicles"]), f"{row['duration_s']:.0f} s", faults)
+        wrong = ", ".join(row["faults"]) or "none"
+        table.add_row(row["name"], row["title"], str(row["vehicles"]), f"{row['duration_s']:.0f} s", wrong)
     console.print(table)
     return 0

@@ -5,10 +5,10 @@ from __future__ import annotations
 import selectors
 from collections.abc import Iterable, Sequence
 
-from gcs.messages import AUTOPILOT
 from wire.clock import WallClock
 from wire.connection import Address, Connection, UdpPort
 from wire.frames import Frame, Framer
+from wire.ids import AUTOPILOT
 
 
 class Live:
@@ -30,8 +30,6 @@ class Live:
                 raise
             self._ports.append(port)
             self._selector.register(port, selectors.EVENT_READ)
-        self.unsent = 0
-        """Frames for vehicles that were never heard, or that the kernel would not take."""
 
     def now(self) -> int:
         """ns since 1970."""
@@ -56,11 +54,16 @@ class Live:
         """To where the vehicle was last heard; before that, to every peer we are to speak to first."""
         route = self._routes.get(system)
         if route is not None:
-            taken = route[0].send(frame, route[1])
-        else:
-            speak_first = [port for port in self._ports if port.connection.kind == "udpout"]
-            taken = sum(port.send(frame) for port in speak_first) > 0
-        self.unsent += not taken
+            route[0].send(frame, route[1])
+            return
+        for port in self._ports:
+            if port.connection.kind == "udpout":
+                port.send(frame)
+
+    @property
+    def speaks_first(self) -> bool:
+        """Whether any link is to peers that wait for us."""
+        return any(port.connection.kind == "udpout" for port in self._ports)
 
     def close(self) -> None:
         """Give the ports back."""

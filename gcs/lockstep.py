@@ -48,5 +48,10 @@ class Lockstep:
         """Delivered at once."""
         self._world.deliver(system, frame)
 
+    @property
+    def rejected(self) -> int:
+        """Frames refused: none, if the world is sound."""
+        return self._framer.rejected
+
     def _time_ns(self, step: int) -> int:
         return EPOCH_NS + step * 1_000_000_000 // self._hz

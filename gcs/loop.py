@@ -22,7 +22,12 @@ class Link(Protocol):
         ...
 
     def send(self, system: int, frame: bytes) -> None:
-        """Towards one vehicle; a link that cannot reach it counts that and goes on."""
+        """Towards one vehicle; a link that cannot reach it goes on."""
+        ...
+
+    @property
+    def rejected(self) -> int:
+        """How much came that was no good frame."""
         ...
 
 

@@ -1,4 +1,4 @@
-"""MAVLink fields ↔ our dataclasses; the only file of the ground station that knows them."""
+"""Our commands as MAVLink, and the numbers of the messages that `telemetry` and `truth` read."""
 
 from __future__ import annotations
 
@@ -19,12 +19,11 @@ from gcs.commands import (
     TakeOff,
 )
 from wire.frames import Sender
+from wire.ids import AUTOPILOT
 from wire.payloads import SET_POSITION_TARGET_LOCAL_NED, PositionTarget, pack_position_target
 
 GROUND_SYSTEM, GROUND_COMPONENT = 255, 190
 """Who we are on the wire."""
-AUTOPILOT, TRUTH = 1, 200
-"""Component ids of a vehicle: its autopilot, and the truth of a simulated one."""
 
 HEARTBEAT = dialect.MAVLINK_MSG_ID_HEARTBEAT
 SYS_STATUS = dialect.MAVLINK_MSG_ID_SYS_STATUS
@@ -35,7 +34,6 @@ GPS_GLOBAL_ORIGIN = dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN
 BATTERY_STATUS = dialect.MAVLINK_MSG_ID_BATTERY_STATUS
 EXTENDED_SYS_STATE = dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE
 STATUSTEXT = dialect.MAVLINK_MSG_ID_STATUSTEXT
-COMMAND_ACK = dialect.MAVLINK_MSG_ID_COMMAND_ACK
 SIM_STATE = dialect.MAVLINK_MSG_ID_SIM_STATE
 
 ARMED = dialect.MAV_MODE_FLAG_SAFETY_ARMED

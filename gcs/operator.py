@@ -1,4 +1,4 @@
-"""What a person does while a flight goes on, as events of the loop: for now, Ctrl-C."""
+"""What a person does while a flight goes on, as events of the loop: for now, to end it."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ import signal
 from collections.abc import Callable
 from types import FrameType, TracebackType
 
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Ctrl-C, a polite kill, a terminal that is closed."""
+
 
 class Operator:
-    """Turns the first Ctrl-C into the event "land"; the second ends the process at once, its recording closed."""
+    """Turns the first signal into the event "land"; the second ends the process at once, its recording closed."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
@@ -16,22 +19,24 @@ class Operator:
         self.interrupted = False
 
     def __enter__(self) -> Operator:
-        self._before = signal.signal(signal.SIGINT, self._on_interrupt)
+        self._before = {number: signal.signal(number, self._on_signal) for number in SIGNALS}
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        signal.signal(signal.SIGINT, self._before)
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
 
     def events(self) -> tuple[str, ...]:
-        """What was asked for since the last call."""
+        """What was asked for since the last call; what is to be said of it is said here, outside the signal."""
         asked, self._waiting = tuple(self._waiting), []
+        if asked:
+            self._say("Landing the swarm. Ctrl-C once more ends at once and lands nothing.")
         return asked
 
-    def _on_interrupt(self, _signal: int, _frame: FrameType | None) -> None:
+    def _on_signal(self, _signal: int, _frame: FrameType | None) -> None:
         if self.interrupted:
             raise KeyboardInterrupt
         self.interrupted = True
         self._waiting.append("land")
-        self._say("Ctrl-C: landing the swarm. Once more ends at once and lands nothing.")

@@ -26,6 +26,7 @@ PLANNED = "#555555"
 ABANDONED = "#b8b8b8"
 LABEL = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.75}
 DPI = 120
+mpl.rcParams["text.parse_math"] = False  # a title or a task may hold a dollar sign
 PANEL_WIDTH, TRUST_HEIGHT = 5.8, 1.3
 """Inches."""
 
@@ -37,11 +38,13 @@ class Panel:
     title: str
     track: Track
     scenario: Scenario
+    problem: str | None = None
+    """Why the flight could not be completed."""
 
 
-def draw(track: Track, scenario: Scenario, path: Path) -> None:
+def draw(track: Track, scenario: Scenario, path: Path, *, problem: str | None = None) -> None:
     """One flight, as trajectory.png."""
-    draw_side_by_side([Panel(controller_name(scenario), track, scenario)], path, heading=scenario.title)
+    draw_side_by_side([Panel(controller_name(scenario), track, scenario, problem)], path, heading=scenario.title)
 
 
 def draw_side_by_side(panels: Sequence[Panel], path: Path, *, heading: str) -> None:
@@ -120,7 +123,7 @@ def _map(axes: Any, panel: Panel, window: Window) -> None:
     mean = (track.position[:, healthy, :2] - offsets_ne(scenario)[healthy]).mean(axis=1)
     axes.plot(mean[:, 1], mean[:, 0], color="black", lw=2.4, zorder=4)
     axes.plot(mean[-1, 1], mean[-1, 0], "D", color="black", ms=5, mec="white", zorder=6)
-    axes.set_title(f"{panel.title}\n{_verdict(result, scenario)}", fontsize=11)
+    axes.set_title(f"{panel.title}\n{_verdict(result, panel)}", fontsize=11)
     axes.set_aspect("equal")
     axes.set_xlabel("east [m]")
     axes.set_ylabel("north [m]")
@@ -161,13 +164,15 @@ def _line(start: Any, end: Any) -> tuple[list[float], list[float]]:
     return [start[1], end[1]], [start[0], end[0]]
 
 
-def _verdict(result: Score | None, scenario: Scenario) -> str:
+def _verdict(result: Score | None, panel: Panel) -> str:
+    if panel.problem is not None:
+        return "\n".join(wrap(f"NOT COMPLETED: {panel.problem}", width=64))
     if result is None:
         return "ended before its read-out"
-    passed = "passes" if result.passed else "FAILS"
+    passed, expect = "passes" if result.passed else "FAILS", panel.scenario.expect
     return (
-        f"{passed}: heading off by {result.heading_error_deg:.1f}° (allowed {scenario.expect.heading_error_deg:g}°), "
-        f"{result.distance_to_target_m:.1f} m from target ({scenario.expect.distance_to_target_m:g} m)"
+        f"{passed}: heading off by {result.heading_error_deg:.1f}° (allowed {expect.heading_error_deg:g}°), "
+        f"{result.distance_to_target_m:.1f} m from target ({expect.distance_to_target_m:g} m)"
     )
 
 
@@ -195,7 +200,7 @@ def _trust(axes: Any, panel: Panel, *, first: bool) -> None:
     axes.set_ylim(-0.08, 1.08)
     axes.set_xlabel("time since mission start [s]")
     if first:
-        axes.set_ylabel("trust")
+        axes.set_ylabel("trust, 0 to 1")
     axes.grid(color="#e6e6e6", lw=0.8)
 
 

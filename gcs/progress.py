@@ -20,6 +20,10 @@ from wire.modes import px4_mode_name
 
 REFRESH_S = 0.1
 """Wall time between two pictures: a fast simulation is not slowed by its display."""
+WAITING_S = 10.0
+"""Between two words on whom we wait for."""
+WARNING = 4
+"""MAV_SEVERITY up to which a vehicle's words are shown."""
 MOST_ROWS = 24
 """Vehicles with a line of their own."""
 
@@ -49,9 +53,14 @@ class Display:
     def tick(self, tick: Tick) -> None:
         """Show this turn of the loop, if it is time."""
         phase = tick.diagnosis.phase
+        for system, severity, text in tick.swarm.words:
+            if severity <= WARNING:
+                self._console.print(f"vehicle {system}: {text}", highlight=False, markup=False)
         if self._live is None:
             if phase is not self._phase:
                 self._console.print(f"{_clock(tick, self._flight)}  {phase.value}", highlight=False)
+            elif phase is Phase.JOIN and tick.number % self._flight.scenario.time.ticks(WAITING_S) == 0:
+                self._console.print(f"{_clock(tick, self._flight)}  {_waiting(tick)}", highlight=False)
         elif (now := time.monotonic()) - self._shown >= REFRESH_S or phase is not self._phase:
             self._shown = now
             self._live.update(self._screen(tick), refresh=True)
@@ -97,6 +106,12 @@ class Display:
         if len(swarm.ids) > MOST_ROWS:
             table.caption = f"and {len(swarm.ids) - MOST_ROWS} more"
         return table
+
+
+def _waiting(tick: Tick) -> str:
+    swarm = tick.swarm
+    missing = [str(system) for row, system in enumerate(swarm.ids) if swarm.heartbeat_ns[row] < 0]
+    return f"waiting for {', '.join(missing) or 'all to be ready'}"
 
 
 def _clock(tick: Tick, flight: Flight) -> str:

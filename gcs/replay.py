@@ -10,8 +10,9 @@ from typing import Any
 from gcs.flight import Flight
 from gcs.loop import fly
 from gcs.recording.reader import RecordedTick, UnreadableRecording, read, ticks
+from gcs.session import RECORDING
 from wire.frames import Frame
-from wire.payloads import SET_POSITION_TARGET_LOCAL_NED
+from wire.payloads import SET_POSITION_TARGET_LOCAL_NED, unpack_position_target
 
 SETPOINT = SET_POSITION_TARGET_LOCAL_NED.to_bytes(3, "little")
 
@@ -46,6 +47,11 @@ class Recorded:
         """Kept for comparison."""
         self.sent[self._page].append(frame)
 
+    @property
+    def rejected(self) -> int:
+        """Nothing: only good frames are recorded."""
+        return 0
+
     def events(self) -> tuple[str, ...]:
         """What the operator asked for at this tick."""
         return self._pages[self._page].events
@@ -70,7 +76,8 @@ class Verification:
 
 
 def decide_again(path: Path) -> Verification:
-    """Decide a recording again, bit for bit. Raises UnreadableRecording."""
+    """Decide a recording, or the one in a run's folder, again, bit for bit. Raises UnreadableRecording."""
+    path = path / RECORDING if path.is_dir() else path
     flight = Flight(read(path).scenario)
     pages = list(ticks(path))
     if not pages:
@@ -100,5 +107,18 @@ def verify(path: Path, *, console: Any) -> int:
             highlight=False,
         )
         return 0
-    console.print(f"the decision differs from tick {result.difference.tick} on", highlight=False)
+    console.print(_words(result.difference), highlight=False, soft_wrap=True)
     return 3
+
+
+def _words(difference: Difference) -> str:
+    """Where the decision differs, and from the first set-point that does, how."""
+    where = f"the decision differs from tick {difference.tick} on"
+    for recorded, decided in zip(difference.recorded, difference.decided, strict=False):
+        if recorded != decided and recorded[7:10] == decided[7:10] == SETPOINT:
+            was, now = (unpack_position_target(frame[10:-2]) for frame in (recorded, decided))
+            return (
+                f"{where}: vehicle {was.target_system} was sent {was.vx:.3f}, {was.vy:.3f}, {was.vz:.3f} m/s, "
+                f"and would be sent {now.vx:.3f}, {now.vy:.3f}, {now.vz:.3f} m/s"
+            )
+    return f"{where}: {len(difference.recorded)} frames were sent, {len(difference.decided)} would be"

@@ -155,6 +155,10 @@ def reproduce(every: Sequence[Condition], *, seeds: int, jobs: int, console: Any
     )
 
 
+class FlightNotCompleted(RuntimeError):
+    """One of many flights could not be flown to its end, so there is no honest table; in one sentence."""
+
+
 def one_flight(condition: Condition, seed: int) -> Score:
     """Fly one condition once, in lockstep, take-off to landing."""
     scenario = condition.build()
@@ -165,7 +169,8 @@ def one_flight(condition: Condition, seed: int) -> Score:
     state = fly(world, world, flight, (truth, tracker), period_ns=scenario.time.period_ns)
     result = None if tracker.track is None else score(tracker.track, scenario)
     if result is None or state.problem is not None:
-        raise RuntimeError(f"{condition}, seed {seed}: {state.problem or 'ended before its read-out'}")
+        what = f"{condition.scenario}, {condition.controller}, severity {condition.severity}, {condition.profile}"
+        raise FlightNotCompleted(f"{what}, seed {seed}: {state.problem or 'ended before its read-out'}")
     return result
 
 

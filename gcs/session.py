@@ -6,6 +6,7 @@ import datetime as dt
 import platform
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from importlib.metadata import version
 from itertools import chain, count
 from pathlib import Path
@@ -14,11 +15,12 @@ from gcs.flight import Flight
 from gcs.flight_state import FlightState
 from gcs.loop import Clock, Link, Record, fly
 from gcs.operator import Operator
-from gcs.recording.writer import Recorder, RecordingError, Tap
-from gcs.scoring import score
+from gcs.recording.writer import SUMMARY, Recorder, RecordingError, Tap
+from gcs.scoring import min_separation, score
 from gcs.summary import Summary, collision, severity_of, trust_of
 from gcs.track import Track, Tracker
 from gcs.truth import Truth
+from gcs.words import faults
 from scenarios import Scenario
 
 RECORDING = "run.mcap"
@@ -57,13 +59,36 @@ def flown(
         )
         took_s = time.perf_counter() - began
         summary = _summary(name, scenario, state, tracker.track, seed, took_s, (out / RECORDING).resolve())
-        recorder.add_metadata("summary", {"json": summary.json().decode()})
-    summary.save(out)
-    if tracker.track is not None:
-        from gcs.picture import draw
-
-        draw(tracker.track, scenario, out / PICTURE)
+        summary = replace(summary, rejected_frames=link.rejected)
+        recorder.add_metadata(SUMMARY, {"json": summary.json().decode()})
+    if recorder.problem is not None:
+        summary = replace(summary, problem=summary.problem or recorder.problem, passed=False)
+    _write_results(summary, tracker.track, scenario, out)
     return summary
+
+
+def _write_results(summary: Summary, track: Track | None, scenario: Scenario, out: Path) -> None:
+    """summary.json and the picture. Raises RecordingError."""
+    try:
+        summary.save(out)
+        if track is not None:
+            from gcs.picture import draw
+
+            draw(track, scenario, out / PICTURE, problem=summary.problem)
+    except OSError as error:
+        raise RecordingError(f"{out}: the results cannot be written: {error.strerror or error}") from None
+
+
+def make_room(folder: Path) -> Path | None:
+    """Take what an earlier run left out of the way: its recording is kept under the time it was closed at."""
+    for name in ("summary.json", PICTURE):
+        (folder / name).unlink(missing_ok=True)
+    recording = folder / RECORDING
+    if not recording.is_file() or recording.stat().st_size == 0:
+        return None
+    closed = dt.datetime.fromtimestamp(recording.stat().st_mtime, dt.UTC).strftime("%Y%m%dT%H%M%S")
+    names = (f"run-{closed}.mcap", *(f"run-{closed}-{number}.mcap" for number in range(2, 1000)))
+    return recording.rename(next(folder / name for name in names if not (folder / name).exists()))
 
 
 def output_folder(out: Path | None, name: str) -> Path:
@@ -121,8 +146,9 @@ def _summary(
     recording: Path,
 ) -> Summary:
     result = None if track is None else score(track, scenario)
+    closest = None if track is None else min_separation(track.position)
     simulated_s = state.tick * scenario.time.period_s
-    problem = state.problem or collision(result)
+    problem = state.problem or collision(closest)
     return Summary(
         scenario=name,
         controller=scenario.control.rule,
@@ -140,5 +166,8 @@ def _summary(
         recording=str(recording),
         profile=scenario.control.profile,
         scored_on="telemetry" if track is not None and track.measured else "truth",
+        faults=faults(scenario),
+        swarm_heading_error_deg=None if result is None else result.swarm_heading_error_deg,
+        rejected_frames=0,
         problem=problem,
     )

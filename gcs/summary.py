@@ -7,7 +7,7 @@ from pathlib import Path
 
 import orjson
 
-from gcs.scoring import CONTACT, Score
+from gcs.scoring import CONTACT
 from scenarios import MotorDegradation, Scenario
 
 
@@ -37,6 +37,12 @@ class Summary:
     profile: str
     scored_on: str
     """"truth", or "telemetry" where no simulation told it."""
+    faults: list[str]
+    """What went wrong with whom, in words."""
+    swarm_heading_error_deg: float | None
+    """As heading_error_deg, of all robots."""
+    rejected_frames: int
+    """What came over the link and was no good frame."""
     problem: str | None
     """Why the flight could not be completed."""
 
@@ -64,8 +70,8 @@ def trust_of(scenario: Scenario) -> str | None:
     return None if scenario.control.rule == "average" else scenario.trust.source
 
 
-def collision(score: Score | None) -> str | None:
+def collision(closest_m: float | None) -> str | None:
     """The sentence for two vehicles that touched."""
-    if score is None or score.min_separation_m >= CONTACT:
+    if closest_m is None or closest_m >= CONTACT:
         return None
-    return f"two vehicles came within {score.min_separation_m:.2f} m of each other: their rotors would have touched"
+    return f"two vehicles came within {closest_m:.2f} m of each other: their rotors would have touched"

@@ -15,6 +15,7 @@ from pymavlink.dialects.v20.common import MAVError
 
 from gcs import messages
 from wire.frames import Frame, decode
+from wire.ids import AUTOPILOT
 from wire.payloads import LocalPosition, unpack_local_position
 
 Array = npt.NDArray[np.float64]
@@ -55,8 +56,8 @@ class Swarm:
     """(N,) 0 … 1; NaN until told."""
     not_finite: int
     """Positions and velocities refused because they were no numbers."""
-    words: tuple[tuple[int, str], ...]
-    """(system id, STATUSTEXT) that arrived with this tick's frames."""
+    words: tuple[tuple[int, int, str], ...]
+    """(system id, MAV_SEVERITY, text) of each STATUSTEXT that arrived with this tick's frames."""
 
     @staticmethod
     def of(ids: Sequence[int]) -> Swarm:
@@ -91,7 +92,7 @@ def observe(swarm: Swarm, frames: Iterable[Frame]) -> Swarm:
     draft = _Draft(swarm)
     for frame in frames:
         fold = _FOLDS.get(frame.message)
-        if fold is not None and frame.component == messages.AUTOPILOT and frame.system in rows:
+        if fold is not None and frame.component == AUTOPILOT and frame.system in rows:
             fold(draft, rows[frame.system], frame)
     return draft.finished()
 
@@ -106,7 +107,7 @@ class _Draft:
         self.positions: dict[int, tuple[int, LocalPosition]] = {}
         """Row → (time of arrival [ns], the newest that arrived)."""
         self.not_finite = swarm.not_finite
-        self.words: list[tuple[int, str]] = []
+        self.words: list[tuple[int, int, str]] = []
 
     def set(self, name: str, row: int, value: float | tuple[float, ...]) -> None:
         copy = self._copies.get(name)
@@ -177,7 +178,8 @@ def _attitude(draft: _Draft, row: int, frame: Frame) -> None:
 
 
 def _words(draft: _Draft, _row: int, frame: Frame) -> None:
-    draft.words.append((frame.system, decode(frame).text))
+    said = decode(frame)
+    draft.words.append((frame.system, said.severity, said.text))
 
 
 def _tolerant(fold: Callable[[_Draft, int, Frame], None]) -> Callable[[_Draft, int, Frame], None]:

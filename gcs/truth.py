@@ -11,6 +11,7 @@ from gcs import messages
 from gcs.loop import Tick
 from gcs.swarm_frame import SwarmFrame
 from gcs.telemetry import Swarm
+from wire.ids import TRUTH
 from wire.payloads import unpack_sim_state
 
 Array = npt.NDArray[np.float64]
@@ -29,7 +30,7 @@ class Truth:
     def tick(self, tick: Tick) -> None:
         """Take in what this turn of the loop received."""
         for frame in tick.frames:
-            if frame.component == messages.TRUTH and frame.message == messages.SIM_STATE and frame.system in self._rows:
+            if frame.component == TRUTH and frame.message == messages.SIM_STATE and frame.system in self._rows:
                 state, row = unpack_sim_state(frame.payload), self._rows[frame.system]
                 self._geodetic[row] = state.lat_int / 1e7, state.lon_int / 1e7, state.alt
                 self.velocity_ned[row] = state.vn, state.ve, state.vd

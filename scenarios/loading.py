@@ -9,6 +9,7 @@ import difflib
 import re
 import tomllib
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -48,8 +49,9 @@ def find(name_or_path: str | Path) -> Path:
     if str(name_or_path) in names():
         return shipped
     path = Path(name_or_path)
-    if path.is_file():
-        return path
+    with suppress(OSError):  # too long a name, say
+        if path.is_file():
+            return path
     raise ScenarioError(
         f"no scenario {str(name_or_path)!r}: neither a file nor one of those that ship ({', '.join(names())})"
     )

@@ -27,13 +27,13 @@ class Section(BaseModel):
 class Time(Section):
     """How finely time is cut."""
 
-    physics_hz: Annotated[int, Field(ge=50, le=2000)] = 250
+    physics_hz: Annotated[int, Field(ge=100, le=1000)] = 250
     """JSBSim steps a second."""
-    period_s: Positive = 0.1
-    """One tick of the ground station: a whole number of physics steps."""
-    positions_per_tick: Annotated[int, Field(ge=1, le=20)] = 1
-    """How often in a tick each vehicle is asked to tell where it is. Once is enough in lockstep, where nothing is late;
-    `gcs fly` asks five times, so that nothing is older than a fifth of a tick."""
+    period_s: Annotated[float, Field(gt=0, le=0.4)] = 0.1
+    """One tick of the ground station: a whole number of physics steps. Vehicles lose patience after 0.5 s."""
+    positions_per_tick: Annotated[int, Field(ge=1, le=20)] | None = None
+    """How often in a tick each vehicle is asked to tell where it is. If absent, once in lockstep, where nothing is
+    late, and five times in `gcs fly`, so that nothing is older than a fifth of a tick."""
     timeout_s: Positive = 180.0
     """A flight that takes longer, take-off to disarm, is given up (exit code 3)."""
 
@@ -70,7 +70,7 @@ class Swarm(Section):
     spacing_m: Positive = 3.0
     leaders: tuple[int, ...] = (1, 3)
     """System ids of the robots that know where the mission goes."""
-    altitude_m: Positive = 10.0
+    altitude_m: Annotated[float, Field(ge=2, le=500)] = 10.0
     """Height above the take-off place."""
 
     @model_validator(mode="after")
@@ -231,11 +231,11 @@ class Trust(Section):
 class Noise(Section):
     """What blurs telemetry and air, seeded, counted from mission start."""
 
-    velocity_m_s: NotNegative = 0.0
+    velocity_m_s: Annotated[float, Field(ge=0, le=10)] = 0.0
     """Standard deviation a horizontal axis, white: drawn anew for each telemetry message of a 10 Hz stream."""
-    position_m: NotNegative = 0.0
+    position_m: Annotated[float, Field(ge=0, le=100)] = 0.0
     """As the velocity's."""
-    gust_m_s: NotNegative = 0.0
+    gust_m_s: Annotated[float, Field(ge=0, le=30)] = 0.0
     """Standard deviation an axis of each vehicle's own first-order Gauss–Markov wind."""
     gust_time_s: Positive = 2.0
     """Its correlation time."""
@@ -244,7 +244,7 @@ class Noise(Section):
 class Wind(Section):
     """Air that moves as a whole."""
 
-    speed_m_s: NotNegative = 0.0
+    speed_m_s: Annotated[float, Field(ge=0, le=50)] = 0.0
     from_deg: Heading = 0.0
     """Where it blows from, as a weather report says it."""
     turbulence: Annotated[float, Field(ge=0, le=30)] = 0.0
@@ -318,6 +318,12 @@ class Scenario(Section):
                 for fault in self.fault
             ]
         )
+
+    def asking(self, positions_per_tick: int) -> Scenario:
+        """The same scenario; vehicles are asked for positions this often where it does not say."""
+        if self.time.positions_per_tick is not None:
+            return self
+        return self._revised(time=self.time.model_dump() | {"positions_per_tick": positions_per_tick})
 
     def without_faults(self) -> Scenario:
         """The same scenario, everything healthy."""

@@ -1,6 +1,6 @@
 """Update rules by name: what velocity a robot takes over from those it hears.
 
-A rule maps (graph, velocities, trust, settings) to one weight an edge; all of them are weighted means.
+A rule maps (graph, trust, settings) to one weight an edge; all of them are weighted means.
 """
 
 from __future__ import annotations

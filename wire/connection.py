@@ -78,7 +78,7 @@ class UdpPort:
     def receive(self) -> list[tuple[bytes, Address]]:
         """Datagrams that wait, oldest first, at most DRAIN_AT_MOST of them."""
         got: list[tuple[bytes, Address]] = []
-        while len(got) < DRAIN_AT_MOST:
+        for _ in range(DRAIN_AT_MOST):
             try:
                 got.append(self._socket.recvfrom(DATAGRAM))
             except BlockingIOError:

@@ -18,7 +18,7 @@ from pydantic import ValidationError
 
 from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
 from gcs.mission import plan
-from gcs.recording.writer import METADATA, SCENARIO
+from gcs.recording.writer import METADATA, SCENARIO, SUMMARY
 from gcs.track import Point, Track
 from scenarios import Scenario
 from wire.frames import Frame, Framer
@@ -38,7 +38,8 @@ class Flown:
 
     path: Path
     scenario: Scenario
-    metadata: dict[str, str]
+    problem: str | None
+    """Why the flight could not be completed, if it told."""
     track: Track | None
 
 
@@ -56,12 +57,13 @@ def read(path: Path) -> Flown:
     with _readable(path), path.open("rb") as stream:
         reader = SeekingReader(stream, validate_crcs=True, record_size_limit=RECORD_SIZE_LIMIT)
         scenario = next((a.data for a in reader.iter_attachments() if a.name == SCENARIO), None)
-        metadata = next((m.metadata for m in reader.iter_metadata() if m.name == METADATA), None)
-        if scenario is None or metadata is None:
+        metadata = {record.name: record.metadata for record in reader.iter_metadata()}
+        if scenario is None or METADATA not in metadata:
             raise UnreadableRecording(f"{path}: an MCAP file, but no flight of ours: it holds no {SCENARIO}")
         loaded = Scenario.model_validate_json(scenario)
         points = list(_points(reader))
-    return Flown(path, loaded, metadata, Track.of(points, read_out_s=plan(loaded).read_out_s))
+        problem = orjson.loads(metadata[SUMMARY]["json"])["problem"] if SUMMARY in metadata else CUT_SHORT
+    return Flown(path, loaded, problem, Track.of(points, read_out_s=plan(loaded).read_out_s))
 
 
 @contextmanager
@@ -80,6 +82,7 @@ def _readable(path: Path) -> Iterator[None]:
         raise UnreadableRecording(f"{path}: torn, damaged or not an MCAP file: {said}") from None
 
 
+CUT_SHORT = "the recording ends before the flight did"
 POINTS = ("/mission", "/trust", "/truth/pose", "/swarm/state")
 
 

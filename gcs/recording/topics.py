@@ -11,7 +11,6 @@ from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 Vector = npt.NDArray[Any]
@@ -71,11 +70,11 @@ class SetpointTopic:
     """/setpoint: velocities (north, east, down) m/s that the controller asked for and that passed the gate."""
 
     tick: int
-    asked: Table
-    sent: Table
-    verdict: Vector
+    asked: Table | None
+    sent: Table | None
+    verdict: Vector | None
     """0 as asked, 1 slowed, 2 refused."""
-    commanded: Vector
+    commanded: Vector | None
     """False for vehicles that were sent none."""
 
 
@@ -145,6 +144,10 @@ JSON_TYPES: dict[str, dict[str, Any]] = {
 }
 
 
+def _json_type(annotation: str) -> dict[str, Any]:
+    return JSON_TYPES[annotation.removesuffix(" | None")]
+
+
 @cache
 def schema(topic: type[Any]) -> dict[str, Any]:
     """The JSON Schema of a topic's class, with its sentences as descriptions."""
@@ -154,7 +157,7 @@ def schema(topic: type[Any]) -> dict[str, Any]:
         "description": inspect.cleandoc(topic.__doc__ or ""),
         "type": "object",
         "properties": {
-            field.name: JSON_TYPES[str(field.type)] | ({"description": said[field.name]} if field.name in said else {})
+            field.name: _json_type(str(field.type)) | ({"description": said[field.name]} if field.name in said else {})
             for field in fields(topic)
         },
         "required": [field.name for field in fields(topic)],
@@ -164,8 +167,3 @@ def schema(topic: type[Any]) -> dict[str, Any]:
 def _sentences(topic: type) -> dict[str, str]:
     """Field name → the string literal under it."""
     return dict(re.findall(r'^    (\w+): .*\n    """(.*?)"""', inspect.getsource(topic), flags=re.MULTILINE))
-
-
-def contiguous(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """As the JSON writer takes it."""
-    return np.ascontiguousarray(array)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
@@ -23,7 +25,8 @@ STATE_EVERY_TICKS = 5
 """Between two /uav/<id>/state: attitude, mode and battery do not come more often."""
 OPTIONS = orjson.OPT_SERIALIZE_NUMPY
 SCENARIO = "scenario.json"
-METADATA = "trustr"
+METADATA, SUMMARY = "trustr", "summary"
+"""Names of the metadata records: what was flown, and what came of it."""
 
 
 class RecordingError(OSError):
@@ -36,7 +39,9 @@ class Recorder:
     def __init__(
         self, path: Path, scenario: Scenario, truth: Truth, *, start_ns: int, metadata: dict[str, str]
     ) -> None:
-        self.path = path
+        self.problem: str | None = None
+        """Why the recording stopped, if it did: the flight goes on without it."""
+        self._path = path
         self._file = _open(path)
         self._writer = Writer(self._file, compression=CompressionType.LZ4)
         self._writer.start(profile="", library="trustr")
@@ -63,15 +68,26 @@ class Recorder:
     def close(self) -> None:
         """Write the summary."""
         if not self._file.closed:
-            self._writer.finish()  # type: ignore[no-untyped-call]
-            self._file.close()
+            self._attempt(self._writer.finish)
+            with suppress(OSError):  # what could not be written has been told
+                self._file.close()
 
     def add_metadata(self, name: str, values: dict[str, str]) -> None:
         """What is known only in the end, and is no part of the promise of same seed, same bytes."""
-        self._writer.add_metadata(name, values)
+        self._attempt(lambda: self._writer.add_metadata(name, values))
+
+    def _attempt(self, write: Callable[[], object]) -> None:
+        """Write, unless writing has failed before: behind a torn chunk nothing is readable."""
+        if self.problem is None:
+            try:
+                write()
+            except OSError as error:
+                self.problem = f"{self._path}: the recording stopped: {error.strerror or error}"
 
     def raw(self, time_ns: int, system: int, component: int, frame: bytes) -> None:
         """A frame, under the name of its sender."""
+        if self.problem is not None:
+            return
         channel = self._raw.get((system, component))
         if channel is None:
             topic = f"/mavlink/{system}_{component}/raw"
@@ -79,7 +95,10 @@ class Recorder:
         self._writer.add_message(channel, time_ns, frame, time_ns)
 
     def tick(self, tick: Tick) -> None:
-        """Our own topics of one turn of the loop."""
+        """Our own topics of one turn of the loop, and every FLUSH_NS all that waits, to the disk."""
+        self._attempt(lambda: self._turn(tick))
+
+    def _turn(self, tick: Tick) -> None:
         number, time_ns, diagnosis = tick.number, tick.time_ns, tick.diagnosis
         self._fleet(tick)
         if diagnosis.sent_ned is not None:
@@ -87,10 +106,9 @@ class Recorder:
                 time_ns,
                 "/setpoint",
                 topics.SetpointTopic(
-                    number, topics.contiguous(diagnosis.asked_ned), diagnosis.sent_ned, diagnosis.verdict,  # type: ignore[arg-type]
-                    diagnosis.commanded,  # type: ignore[arg-type]
+                    number, diagnosis.asked_ned, diagnosis.sent_ned, diagnosis.verdict, diagnosis.commanded
                 ),
-            )  # fmt: skip
+            )
         if diagnosis.virtual is not None:
             self._mission(tick)
         if self._truth.known and tick.state.frame is not None:
@@ -173,6 +191,11 @@ class Tap:
         """What goes, recorded before it does."""
         self._recorder.raw(self._clock.now(), GROUND_SYSTEM, GROUND_COMPONENT, frame)
         self._link.send(system, frame)
+
+    @property
+    def rejected(self) -> int:
+        """What the link refused."""
+        return self._link.rejected
 
 
 def _fault_topic(fault: Fault, mission_s: float) -> topics.FaultTopic:

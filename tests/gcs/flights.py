@@ -54,6 +54,10 @@ class Counting:
         self.sent.append((system, frame))
         self._link.send(system, frame)
 
+    @property
+    def rejected(self):
+        return self._link.rejected
+
 
 class Severed:
     """A link that loses one vehicle, both ways, so many seconds after it was made."""
@@ -68,6 +72,10 @@ class Severed:
     def send(self, system, frame):
         if not self._lost(system, self._clock.now()):
             self._link.send(system, frame)
+
+    @property
+    def rejected(self):
+        return self._link.rejected
 
     def _lost(self, system, time_ns):
         return system == self._system and time_ns >= self._from_ns

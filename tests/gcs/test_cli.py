@@ -22,7 +22,7 @@ CONTRACT = {
     "scenario", "controller", "trust", "severity", "seed", "heading_error_deg", "distance_to_target_m",
     "min_separation_m", "passed", "detected", "false_alarms", "simulated_s", "real_time_factor", "recording",
 }  # fmt: skip
-BESIDES = {"profile", "scored_on", "problem"}
+BESIDES = {"profile", "scored_on", "problem", "faults", "swarm_heading_error_deg", "rejected_frames"}
 """Keys that the contract does not have yet."""
 BRIEFLY = [word for override in SHORT for word in ("--set", override)]
 
@@ -80,7 +80,7 @@ def test_a_run_in_words_says_what_was_flown_how_it_ended_and_where_it_is(gcs, tm
             "--trust ratings --set control.profile=recommended",
             {"controller": "trust-r", "trust": "ratings", "severity": 0.4, "profile": "recommended"},
         ),
-        ("--no-fault --severity 0.7", {"severity": None, "detected": {}}),
+        ("--no-fault", {"severity": None, "detected": {}, "faults": []}),
     ],
     ids=["average", "ratings", "no-fault"],
 )
@@ -160,7 +160,10 @@ REFUSED = [
     (["compare"], "at least one"),
     (["compare", "nowhere"], "nowhere"),
     (["replay", "--verify", "nowhere"], "nowhere"),
-    (["replay", "nowhere"], "--verify"),
+    (["replay", "nowhere"], "nowhere"),
+    (["run", "demo", "--severity", "0.4"], "no degraded motor"),
+    (["run", "emergency", "--severity", "0.4", "--no-fault"], "no degraded motor"),
+    (["run", "x" * 300], "no scenario"),
 ]
 
 
@@ -342,9 +345,55 @@ def test_a_second_ctrl_c_ends_at_once_and_the_recording_is_whole(tmp_path):
     )
     until_said(process, "mission")
     process.send_signal(signal.SIGINT)
-    until_said(process, "Once more")
+    until_said(process, "once more")
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130
     assert "Traceback" not in err
     assert decide_again(tmp_path / "run.mcap").difference is None
+
+
+def test_a_polite_kill_lands_the_swarm_too(tmp_path):
+    process = start(GCS, "run", "emergency", "--set", "event.0.length_m=300", "--out", tmp_path, "--json")
+    until_said(process, "mission")
+    process.send_signal(signal.SIGTERM)
+    out, _ = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert orjson.loads(out)["passed"] is False
+    assert decide_again(tmp_path / "run.mcap").difference is None
+
+
+def test_a_disk_that_fills_up_stops_the_recording_and_not_the_flight(gcs, tmp_path):
+    (tmp_path / "run.mcap").symlink_to("/dev/full")
+    code, out, err = gcs("run", "demo", *BRIEFLY, "--out", tmp_path, "--json")
+    assert code == 3
+    result = orjson.loads(out)
+    assert "the recording stopped: No space left on device" in result["problem"]
+    assert result["heading_error_deg"] is not None
+    assert result["passed"] is False
+    assert "Traceback" not in err
+
+
+def test_an_earlier_recording_in_the_same_folder_is_kept(gcs, tmp_path):
+    gcs("run", "demo", *BRIEFLY, "--out", tmp_path)
+    first = (tmp_path / "run.mcap").read_bytes()
+    _, _, err = gcs("run", "demo", *BRIEFLY, "--seed", "2", "--out", tmp_path)
+    (kept,) = tmp_path.glob("run-*.mcap")
+    assert kept.read_bytes() == first
+    assert str(kept) in err
+
+
+def test_what_people_write_is_not_taken_for_markup(gcs, tmp_path):
+    text = BRACKETS.replace("TITLE", "[/b] costs $5 or $\\\\frac$").replace("TASK", "[red]$x_")
+    (tmp_path / "odd.toml").write_text(text)
+    code, _, _ = gcs("run", tmp_path / "odd.toml", "--out", tmp_path / "[/a]")
+    assert code == 0
+    code, out, _ = gcs("compare", tmp_path / "[/a]", "--out", tmp_path / "c.png")
+    assert code == 0
+    assert "[/b] costs $5" in out
+
+
+BRACKETS = """
+title = "TITLE"
+mission.leg = [{task = "TASK", heading_deg = 0, length_m = 3}]
+"""

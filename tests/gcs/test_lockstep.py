@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import common as dialect
 
 from gcs.lockstep import EPOCH_NS, Lockstep
 from gcs.mission import plan
-from gcs.reproduce import one_flight
+from gcs.reproduce import Condition, FlightNotCompleted, one_flight
 from scenarios import load, offsets_ne
 from wire.frames import decode
 
@@ -119,9 +119,19 @@ def test_a_healthy_follower_lost_does_not_keep_the_others_from_passing():
 
 
 def test_one_flight_that_is_not_completed_is_no_result():
-    class Hopeless:
+    class Hopeless(Condition):
         def build(self):
             return load("demo", overrides=["time.timeout_s=2"])
 
-    with pytest.raises(RuntimeError, match=r"time\.timeout_s = 2 s"):
-        one_flight(Hopeless(), 1)
+    with pytest.raises(FlightNotCompleted, match=r"time\.timeout_s = 2 s"):
+        one_flight(Hopeless("demo", None, "trust-r", "paper"), 1)
+
+
+def test_a_vehicle_that_comes_down_is_named_and_the_others_fly_on():
+    summary = fly_and_record("demo", 'fault=[{vehicle=5, kind="rotor", rotor=1, efficiency=0.0}]').summary
+    assert summary.problem is not None
+    assert summary.problem.startswith("vehicle 5 came down ")
+    assert summary.faults == ["a broken rotor on robot 5"]
+    assert summary.heading_error_deg < 4  # the five healthy ones got there
+    assert summary.distance_to_target_m < 3.2
+    assert not summary.passed

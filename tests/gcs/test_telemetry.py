@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common as dialect
 
-from gcs.messages import AUTOPILOT, TRUTH
 from gcs.telemetry import REBOOTED_MS, Swarm, observe
 from wire.frames import Framer, Sender
+from wire.ids import AUTOPILOT, TRUTH
 from wire.payloads import LOCAL_POSITION_NED, LocalPosition, pack_local_position
 
 NOW = 1_577_836_800_000_000_000
@@ -73,7 +73,7 @@ def test_every_message_tells_its_vehicle_and_nobody_else():
     assert swarm.origin[1] == pytest.approx([41.1512, -81.4161, 320.5])
     assert swarm.attitude_rpy[1] == pytest.approx([0.1, -0.2, 0.3])
     assert (swarm.armed[1], swarm.ready[1], swarm.on_ground[1]) == (True, True, False)
-    assert swarm.words == ((2, "hello"),)
+    assert swarm.words == ((2, 6, "hello"),)
     others = [0, 2]
     for field in fields(Swarm):
         before, after = getattr(FLEET, field.name), getattr(swarm, field.name)
