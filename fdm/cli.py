@@ -9,7 +9,14 @@ from typing import Annotated, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
-app = App(name="fdm", help="Fly a scenario's vehicles in JSBSim, each behind a MAVLink endpoint.", version="0.1.0")
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("trustr")
+
+
+app = App(name="fdm", help="Fly a scenario's vehicles in JSBSim, each behind a MAVLink endpoint.", version=_version)
 
 
 @app.command

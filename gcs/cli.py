@@ -16,10 +16,16 @@ if TYPE_CHECKING:
     from gcs.summary import Summary
     from scenarios import Scenario
 
+def _version() -> str:
+    from importlib.metadata import version
+
+    return version("trustr")
+
+
 app = App(
     name="gcs",
     help="Ground station for swarms that know whom to trust.",
-    version="0.1.0",
+    version=_version,
 )
 
 FLOWN, BAD_INPUT, NOT_COMPLETED, INTERRUPTED = 0, 2, 3, 130

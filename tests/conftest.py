@@ -13,3 +13,10 @@ settings.register_profile(
     "soak", max_examples=SOAK_EXAMPLES, deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile(os.environ.get("TRUSTR_PROFILE", "test"))
+
+
+def pytest_sessionfinish(session):
+    """A skipped test is a claim that nobody checked: it fails the run."""
+    reporter = session.config.pluginmanager.get_plugin("terminalreporter")
+    if reporter is not None and reporter.stats.get("skipped") and session.exitstatus == 0:
+        session.exitstatus = 1
