@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from gcs.summary import Summary
     from scenarios import Scenario
 
+
 def _version() -> str:
     from importlib.metadata import version
 
