@@ -63,6 +63,8 @@ class Surroundings:
         if self._air is not None:
             north, east = next(self._air)
             vehicle.set_wind((self._wind[0] + north, self._wind[1] + east, 0.0))
+        if not self._rotors:
+            return
         rotors = self._faults.rotors(time_s - self._start_s)
         for rotor, health in rotors.items():
             if self._rotors[rotor] != health:

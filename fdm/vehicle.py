@@ -5,7 +5,7 @@ velocity and a yaw and needs no Python between physics steps. Step it in bursts 
 """
 
 from dataclasses import dataclass
-from math import atan2, cos, degrees, isfinite, radians, sin
+from math import cos, degrees, isfinite, pi, radians, sin, tau
 from typing import Final, NamedTuple
 
 import jsbsim
@@ -173,7 +173,7 @@ class Vehicle:
             self._run(n)
         else:
             self._settle(n)
-        if not isfinite(sum(node.get_double_value() for node in self._health)):
+        if not isfinite(sum([node.get_double_value() for node in self._health])):
             raise FlightModelDiverged(f"the flight model diverged before step {self.steps}: its state is not finite")
 
     def _run(self, n: int) -> None:
@@ -218,20 +218,20 @@ class Vehicle:
 
     def state(self) -> VehicleState:
         """The whole truth, for records and sensors."""
-        north, east, down, *velocity = self.position_velocity()
-        roll, pitch, yaw = (node.get_double_value() for node in self._attitude)
-        latitude, longitude, altitude_ft = (node.get_double_value() for node in self._place)
+        north, east, down, vn, ve, vd = self.position_velocity()
+        roll, pitch, yaw = _vector(self._attitude, 1.0)
+        latitude, longitude, altitude_ft = _vector(self._place, 1.0)
         return VehicleState(
-            time_s=self.steps / self._physics_hz,
-            position_ned=(north, east, down),
-            velocity_ned=(velocity[0], velocity[1], velocity[2]),
-            acceleration_body=self._specific_force(roll, pitch),
-            attitude_rpy=(roll, pitch, atan2(sin(yaw), cos(yaw))),
-            attitude_wxyz=_quaternion(roll, pitch, yaw),
-            rate_body=_vector(self._rate, 1.0),
-            latitude_deg=latitude,
-            longitude_deg=longitude,
-            altitude_m=altitude_ft * FOOT,
+            self.steps / self._physics_hz,
+            (north, east, down),
+            (vn, ve, vd),
+            self._specific_force(roll, pitch),
+            (roll, pitch, yaw if yaw <= pi else yaw - tau),
+            _quaternion(roll, pitch, yaw),
+            _vector(self._rate, 1.0),
+            latitude,
+            longitude,
+            altitude_ft * FOOT,
         )
 
     def _specific_force(self, roll: float, pitch: float) -> Vector:
@@ -282,8 +282,10 @@ class Vehicle:
     def set_wind(self, wind_ned: Vector) -> None:
         """The velocity of the air here and now, m/s towards NED: steady wind and gust together."""
         _check_finite("wind", wind_ned)
-        for node, value in zip(self._gust, wind_ned, strict=True):
-            node.set_double_value(value / FOOT)
+        north, east, down = self._gust
+        north.set_double_value(wind_ned[0] / FOOT)
+        east.set_double_value(wind_ned[1] / FOOT)
+        down.set_double_value(wind_ned[2] / FOOT)
 
     def set_turbulence(self, wind_at_6m: float) -> None:
         """Fly in Dryden turbulence (MIL-F-8785C, JSBSim type 4) as a wind of so many m/s at 6 m makes it.

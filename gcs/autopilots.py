@@ -18,11 +18,11 @@ from wire.modes import PX4_MODES
 SLOW_S: tuple[tuple[int, float], ...] = (
     (messages.ATTITUDE, 1.0),
     (messages.SYS_STATUS, 1.0),
-    (messages.EXTENDED_SYS_STATE, 1.0),
-    (messages.BATTERY_STATUS, 2.0),
+    (messages.EXTENDED_SYS_STATE, -1e-6),
+    (messages.BATTERY_STATUS, -1e-6),
     (messages.GLOBAL_POSITION_INT, -1e-6),
 )
-"""Message id and interval of what we use now and then; −1 µs turns off what we do not use."""
+"""Message id and interval of what is shown and recorded now and then; −1 µs turns off what nobody reads."""
 
 AT_HEIGHT = 0.3
 """m: off the height asked for."""

@@ -38,7 +38,6 @@ SIM_STATE = dialect.MAVLINK_MSG_ID_SIM_STATE
 
 ARMED = dialect.MAV_MODE_FLAG_SAFETY_ARMED
 PREARM_CHECK = dialect.MAV_SYS_STATUS_PREARM_CHECK
-ON_GROUND = dialect.MAV_LANDED_STATE_ON_GROUND
 
 VELOCITY_WITH_YAW = 0x09C7
 """type_mask: velocity and yaw count, all else is to be ignored."""

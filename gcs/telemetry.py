@@ -51,7 +51,6 @@ class Swarm:
     armed: Flags
     ready: Flags
     """(N,) the autopilot's own checks before arming pass."""
-    on_ground: Flags
     battery: Array
     """(N,) 0 … 1; NaN until told."""
     not_finite: int
@@ -75,7 +74,6 @@ class Swarm:
             custom_mode=np.zeros(n, np.int64),
             armed=np.zeros(n, bool),
             ready=np.zeros(n, bool),
-            on_ground=np.ones(n, bool),
             battery=np.full(n, np.nan),
             not_finite=0,
             words=(),
@@ -163,10 +161,6 @@ def _sys_status(draft: _Draft, row: int, frame: Frame) -> None:
         draft.set("battery", row, status.battery_remaining / 100)
 
 
-def _extended_sys_state(draft: _Draft, row: int, frame: Frame) -> None:
-    draft.set("on_ground", row, decode(frame).landed_state == messages.ON_GROUND)
-
-
 def _origin(draft: _Draft, row: int, frame: Frame) -> None:
     origin = decode(frame)
     draft.set("origin", row, (origin.latitude / 1e7, origin.longitude / 1e7, origin.altitude / 1e3))
@@ -198,7 +192,6 @@ _FOLDS: dict[int, Callable[[_Draft, int, Frame], None]] = {
     messages.LOCAL_POSITION_NED: _local_position,
     messages.HEARTBEAT: _tolerant(_heartbeat),
     messages.SYS_STATUS: _tolerant(_sys_status),
-    messages.EXTENDED_SYS_STATE: _tolerant(_extended_sys_state),
     messages.GPS_GLOBAL_ORIGIN: _tolerant(_origin),
     messages.ATTITUDE: _tolerant(_attitude),
     messages.STATUSTEXT: _tolerant(_words),
