@@ -28,7 +28,7 @@ def serve(
     ports: Literal["shared", "separate"] = "shared",
     speed: float = 1.0,
     seed: int = 1,
-    set_: Annotated[tuple[str, ...], Parameter(name="--set", negative=())] = (),
+    set_: Annotated[tuple[str, ...], Parameter(name="--set", negative=(), show_default=False)] = (),
 ) -> int:
     """Serve the vehicles of a scenario over UDP until Ctrl-C.
 

@@ -38,7 +38,7 @@ LIVE_POSITIONS = 5
 ScenarioName = Annotated[str, Parameter(help="A scenario's name (see `gcs scenarios`), or the path of a TOML file.")]
 Out = Annotated[
     Path | None,
-    Parameter(help="Folder for run.mcap, summary.json and trajectory.png; runs/<time>-<scenario> if absent."),
+    Parameter(help="Folder for run.mcap, summary.json and trajectory.png; runs/TIME-SCENARIO if absent."),
 ]
 AsJson = Annotated[bool, Parameter(name="--json", negative=(), show_default=False, help="One JSON object on stdout.")]
 Yes = Annotated[bool, Parameter(negative=(), show_default=False, help="Do not ask before arming.")]
