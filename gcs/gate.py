@@ -31,6 +31,8 @@ def admit(asked_ned: Array, before_ned: Array, limits: Limits, *, dt: float) -> 
     acceleration ends between two allowed velocities, so both bounds hold at once.
     """
     finite = np.asarray(np.isfinite(asked_ned).all(axis=1))
+    if finite.all() and _within(asked_ned, limits.speed) and _within(asked_ned - before_ned, limits.acceleration * dt):
+        return asked_ned.copy(), np.full(len(asked_ned), PASSED, np.int8)
     wanted = np.where(finite[:, None], asked_ned, 0.0)
     wanted = _shorten(wanted, limits.speed)
     change = wanted - before_ned
@@ -38,6 +40,11 @@ def admit(asked_ned: Array, before_ned: Array, limits: Limits, *, dt: float) -> 
     slowed = np.abs(sent - asked_ned).max(axis=1) > 1e-9
     verdict = np.where(finite, np.where(slowed, SLOWED, PASSED), REFUSED).astype(np.int8)
     return sent, verdict
+
+
+def _within(vectors: Array, most: float) -> bool:
+    """Whether the horizontal and vertical parts of all vectors (N, 3) are no longer than `most`."""
+    return bool(np.abs(vectors[:, 2]).max() <= most and np.hypot(vectors[:, 0], vectors[:, 1]).max() <= most)
 
 
 def _shorten(vectors: Array, most: float) -> Array:

@@ -86,8 +86,7 @@ def decide(observation: Observation, virtual: VirtualLeader, settings: Settings)
     heard = (
         observation.heard & np.isfinite(observation.position_ne).all(1) & np.isfinite(observation.velocity_ne).all(1)
     )
-    position = np.where(heard[:, None], observation.position_ne, 0.0)
-    velocity = np.where(heard[:, None], observation.velocity_ne, 0.0)
+    position, velocity = _of_the_heard(observation.position_ne, heard), _of_the_heard(observation.velocity_ne, heard)
     graph = neighbours(position, heard, range_m=settings.range_m)
     weights = RULES[settings.rule](graph, observation.trust, settings)
     consensus = weighted_mean(graph, weights, velocity)
@@ -119,4 +118,9 @@ def decide(observation: Observation, virtual: VirtualLeader, settings: Settings)
             cap=settings.feedback_cap,
         )
     command += separation(graph, position, radius=settings.separation_radius, gain=settings.separation_gain)
-    return Decision(np.where(heard[:, None], command, 0.0), graph, weights)
+    return Decision(_of_the_heard(command, heard), graph, weights)
+
+
+def _of_the_heard(vectors: Array, heard: npt.NDArray[np.bool_]) -> Array:
+    """(N, 2) with zero for whom is not heard: whatever is not finite stops here."""
+    return vectors if heard.all() else np.where(heard[:, None], vectors, 0.0)
