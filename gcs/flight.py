@@ -33,7 +33,7 @@ from gcs.swarm_frame import swarm_frame
 from gcs.telemetry import Swarm
 from scenarios import Scenario, offsets_ne
 from trustr.controller import Decision, Observation, decide
-from trustr.leader import VirtualLeader
+from trustr.leader import VirtualLeader, capped
 
 Array = npt.NDArray[np.float64]
 Commands = list[tuple[int, Command]]
@@ -173,8 +173,7 @@ class Flight:
         place = self._offset_ne - (self._run_up_m(self._run_up_ticks) - self._run_up_m(into)) * ahead
         diagnosis = self._overview(state, swarm)
         back = RUN_UP_GAIN * (place - diagnosis.position_ne)
-        too_far = np.maximum(np.hypot(back[:, 0], back[:, 1]) / RUN_UP_CAP, 1.0)
-        asked = speed * ahead + np.where(np.isfinite(back), back, 0.0) / too_far[:, None]
+        asked = speed * ahead + capped(np.where(np.isfinite(back), back, 0.0), RUN_UP_CAP)
         return self._steer(state, swarm, asked, diagnosis)
 
     def _mission(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:

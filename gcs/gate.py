@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from trustr.leader import capped
+
 Array = npt.NDArray[np.float64]
 
 PASSED, SLOWED, REFUSED = 0, 1, 2
@@ -31,8 +33,6 @@ def admit(asked_ned: Array, before_ned: Array, limits: Limits, *, dt: float) -> 
     acceleration ends between two allowed velocities, so both bounds hold at once.
     """
     finite = np.asarray(np.isfinite(asked_ned).all(axis=1))
-    if finite.all() and _within(asked_ned, limits.speed) and _within(asked_ned - before_ned, limits.acceleration * dt):
-        return asked_ned.copy(), np.full(len(asked_ned), PASSED, np.int8)
     wanted = np.where(finite[:, None], asked_ned, 0.0)
     wanted = _shorten(wanted, limits.speed)
     change = wanted - before_ned
@@ -42,15 +42,9 @@ def admit(asked_ned: Array, before_ned: Array, limits: Limits, *, dt: float) -> 
     return sent, verdict
 
 
-def _within(vectors: Array, most: float) -> bool:
-    """Whether the horizontal and vertical parts of all vectors (N, 3) are no longer than `most`."""
-    return bool(np.abs(vectors[:, 2]).max() <= most and np.hypot(vectors[:, 0], vectors[:, 1]).max() <= most)
-
-
 def _shorten(vectors: Array, most: float) -> Array:
     """Vectors (N, 3) with their horizontal and vertical parts no longer than `most`."""
-    shorter = vectors.copy()
-    horizontal = np.hypot(vectors[:, 0], vectors[:, 1])
-    shorter[:, :2] *= np.minimum(1.0, most / np.maximum(horizontal, 1e-12))[:, None]
+    shorter = np.empty_like(vectors)
+    shorter[:, :2] = capped(vectors[:, :2], most)
     shorter[:, 2] = np.minimum(np.maximum(vectors[:, 2], -most), most)
     return shorter

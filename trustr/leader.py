@@ -45,6 +45,10 @@ def navigational_feedback(
     robots that answer in τ seconds accelerates their mean velocity by (L/N) u^γ / τ, so τ N / L gives it a_γ.
     """
     wanted = -c1 * (place_ne - virtual.position_ne) - c2 * (velocity_ne - virtual.velocity_ne)
-    length = np.hypot(wanted[:, 0], wanted[:, 1])
-    capped = wanted * np.minimum(1.0, cap / np.maximum(length, 1e-12))[:, None]
-    return np.asarray(capped + lead_s * virtual.acceleration_ne)
+    return capped(wanted, cap) + lead_s * virtual.acceleration_ne
+
+
+def capped(vectors_ne: Array, most: float) -> Array:
+    """Vectors (M, 2), those longer than `most` shortened to it."""
+    length = np.hypot(vectors_ne[:, 0], vectors_ne[:, 1])
+    return np.asarray(vectors_ne * np.minimum(1.0, most / np.maximum(length, 1e-12))[:, None])
