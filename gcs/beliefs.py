@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from scenarios import Scenario
+from scenarios import Scenario, healthy_robots
 from trustr.rating import study_trust
 
 Array = npt.NDArray[np.float64]
@@ -39,8 +39,7 @@ def _truth(scenario: Scenario) -> TrustSource:
 
 def _ratings(scenario: Scenario) -> TrustSource:
     """The study's means, all the flight long: one for robots that fail at any time in it, one for the others."""
-    faulty = np.zeros(scenario.swarm.count, bool)
-    for fault in scenario.fault:
-        faulty[fault.vehicle - 1] = True
-    fixed = study_trust(faulty, faulty_rating=scenario.trust.faulty_rating, others_rating=scenario.trust.others_rating)
+    rating = scenario.trust
+    faulty = ~healthy_robots(scenario)
+    fixed = study_trust(faulty, faulty_rating=rating.faulty_rating, others_rating=rating.others_rating)
     return lambda _time_s: fixed

@@ -16,9 +16,9 @@ import numpy as np
 from matplotlib.lines import Line2D
 
 from gcs.mission import Plan, plan
-from gcs.scoring import Score, healthy_robots, score
+from gcs.scoring import Score, score
 from gcs.track import Track
-from scenarios import Scenario, offsets_ne
+from scenarios import Scenario, healthy_robots, offsets_ne
 
 HEALTHY = ("#1f4e8c", "#2a7fba", "#3aa6a0", "#5b8def", "#6a7fb5", "#2c9c6a")
 FAILED = "#d62728"

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from gcs.mission import plan
 from gcs.track import Track
-from scenarios import Scenario, offsets_ne
+from scenarios import Scenario, healthy_robots, offsets_ne
 
 Array = npt.NDArray[np.float64]
 
@@ -68,14 +68,6 @@ def score(track: Track, scenario: Scenario) -> Score | None:
         detected=_detected(track, scenario),
         false_alarms=int((track.trust[:, healthy] < DISTRUSTED).any(axis=0).sum()),
     )
-
-
-def healthy_robots(scenario: Scenario) -> npt.NDArray[np.bool_]:
-    """(N,) robots that no fault ever strikes."""
-    healthy = np.ones(scenario.swarm.count, bool)
-    for fault in scenario.fault:
-        healthy[fault.vehicle - 1] = False
-    return healthy
 
 
 def heading_error(start_ne: Array, end_ne: Array, wanted_ne: Array) -> float:

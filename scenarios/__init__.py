@@ -1,6 +1,6 @@
 """Scenarios: what is flown, by whom, what goes wrong, what counts as success. Data and a loader."""
 
-from scenarios.layout import offsets_ne
+from scenarios.layout import healthy_robots, offsets_ne
 from scenarios.loading import ScenarioError, find, load, names, parse
 from scenarios.models import Fault, Leg, MotorDegradation, Redirect, RotorFault, Scenario, direction
 
@@ -14,6 +14,7 @@ __all__ = [
     "ScenarioError",
     "direction",
     "find",
+    "healthy_robots",
     "load",
     "names",
     "offsets_ne",

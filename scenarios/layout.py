@@ -1,4 +1,4 @@
-"""Where each robot stands in the formation."""
+"""The swarm as arrays, in the order of system ids: where each robot stands in the formation, and who stays healthy."""
 
 from __future__ import annotations
 
@@ -21,3 +21,11 @@ def offsets_ne(scenario: Scenario) -> npt.NDArray[np.float64]:
     places = np.outer(ahead, forward) + np.outer(across, right)
     centred: npt.NDArray[np.float64] = places - places.mean(axis=0)
     return centred
+
+
+def healthy_robots(scenario: Scenario) -> npt.NDArray[np.bool_]:
+    """(N,) robots that no fault ever strikes."""
+    healthy = np.ones(scenario.swarm.count, bool)
+    for fault in scenario.fault:
+        healthy[fault.vehicle - 1] = False
+    return healthy

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gcs.mission import paper_leader, plan
-from gcs.scoring import heading_error, healthy_robots, min_separation, score
+from gcs.scoring import heading_error, min_separation, score
 from gcs.track import Track
-from scenarios import load, offsets_ne
+from scenarios import healthy_robots, load, offsets_ne
 
 TRANSIT, EMERGENCY, DEMO = load("transit"), load("emergency"), load("demo")
 TICK = 0.1

@@ -10,8 +10,8 @@ import pytest
 
 from gcs.control import settings
 from gcs.mission import PROFILES, plan
-from gcs.scoring import heading_error, healthy_robots
-from scenarios import load, offsets_ne
+from gcs.scoring import heading_error
+from scenarios import healthy_robots, load, offsets_ne
 from scenarios.degradation import degrade
 from trustr.controller import Observation, decide
 
