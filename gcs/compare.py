@@ -10,9 +10,8 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from gcs.recording.reader import Flown, UnreadableRecording, read
+from gcs.recording.reader import Flown, UnreadableRecording, located, read
 from gcs.scoring import Score, score
-from gcs.session import RECORDING
 from gcs.words import faults
 
 FORMATS = (".png", ".pdf", ".svg")
@@ -28,7 +27,7 @@ def compare(recordings: Sequence[Path], *, picture: Path, console: Any) -> None:
         raise UnreadableRecording("compare: name at least one recording, or the folder of a run")
     if picture.suffix not in FORMATS:
         raise UnwritablePicture(f"--out {picture}: must end in {', '.join(FORMATS)}")
-    flights = [read(path / RECORDING if path.is_dir() else path) for path in recordings]
+    flights = [read(located(path)) for path in recordings]
     console.print(_table(flights))
     for flight in flights:
         console.print(f"recording  {flight.path.resolve()}", highlight=False, soft_wrap=True, markup=False)

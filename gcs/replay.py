@@ -9,8 +9,7 @@ from typing import Any
 
 from gcs.flight import Flight
 from gcs.loop import fly
-from gcs.recording.reader import RecordedTick, UnreadableRecording, read, ticks
-from gcs.session import RECORDING
+from gcs.recording.reader import RecordedTick, UnreadableRecording, located, read, ticks
 from wire.frames import Frame
 from wire.payloads import SET_POSITION_TARGET_LOCAL_NED, unpack_position_target
 
@@ -77,7 +76,7 @@ class Verification:
 
 def decide_again(path: Path) -> Verification:
     """Decide a recording, or the one in a run's folder, again, bit for bit. Raises UnreadableRecording."""
-    path = path / RECORDING if path.is_dir() else path
+    path = located(path)
     flight = Flight(read(path).scenario)
     pages = list(ticks(path))
     if not pages:

@@ -5,16 +5,17 @@ from __future__ import annotations
 import datetime as dt
 import platform
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from importlib.metadata import version
-from itertools import chain, count
+from itertools import count
 from pathlib import Path
 
 from gcs.flight import Flight
 from gcs.flight_state import FlightState
 from gcs.loop import Clock, Link, Record, fly
 from gcs.operator import Operator
+from gcs.recording.reader import RECORDING
 from gcs.recording.writer import SUMMARY, Recorder, RecordingError, Tap
 from gcs.scoring import min_separation, score
 from gcs.summary import Summary, collision, severity_of, trust_of
@@ -23,7 +24,6 @@ from gcs.truth import Truth
 from gcs.words import faults
 from scenarios import Scenario
 
-RECORDING = "run.mcap"
 PICTURE = "trajectory.png"
 
 
@@ -58,12 +58,13 @@ def flown(
             events=operator.events,
         )
         took_s = time.perf_counter() - began
-        summary = _summary(name, scenario, state, tracker.track, seed, took_s, (out / RECORDING).resolve())
-        summary = replace(summary, rejected_frames=link.rejected)
+        track = tracker.track
+        recording = (out / RECORDING).resolve()
+        summary = _summary(name, scenario, state, track, seed, took_s, recording, link.rejected)
         recorder.add_metadata(SUMMARY, {"json": summary.json().decode()})
     if recorder.problem is not None:
         summary = replace(summary, problem=summary.problem or recorder.problem, passed=False)
-    _write_results(summary, tracker.track, scenario, out)
+    _write_results(summary, track, scenario, out)
     return summary
 
 
@@ -87,8 +88,8 @@ def make_room(folder: Path) -> Path | None:
     if not recording.is_file() or recording.stat().st_size == 0:
         return None
     closed = dt.datetime.fromtimestamp(recording.stat().st_mtime, dt.UTC).strftime("%Y%m%dT%H%M%S")
-    names = (f"run-{closed}.mcap", *(f"run-{closed}-{number}.mcap" for number in range(2, 1000)))
-    return recording.rename(next(folder / name for name in names if not (folder / name).exists()))
+    namesakes = _namesakes(folder, f"run-{closed}", ".mcap")
+    return recording.rename(next(path for path in namesakes if not path.exists()))
 
 
 def output_folder(out: Path | None, name: str) -> Path:
@@ -108,13 +109,20 @@ def output_folder(out: Path | None, name: str) -> Path:
 
 def _new(folder: Path) -> Path:
     """This folder, or the first of its namesakes that nobody has: two runs may begin in one second."""
-    for candidate in chain([folder], (folder.with_name(f"{folder.name}-{number}") for number in count(2))):
+    for candidate in _namesakes(folder.parent, folder.name):
         try:
             candidate.mkdir(parents=True)
         except FileExistsError:
             continue
         return candidate
-    raise AssertionError("count() ends never")
+    raise AssertionError("names never end")
+
+
+def _namesakes(folder: Path, stem: str, suffix: str = "") -> Iterator[Path]:
+    """This name in the folder, then the same numbered from 2, without end."""
+    yield folder / f"{stem}{suffix}"
+    for number in count(2):
+        yield folder / f"{stem}-{number}{suffix}"
 
 
 def _metadata(name: str, seed: int | None) -> dict[str, str]:
@@ -144,6 +152,7 @@ def _summary(
     seed: int | None,
     took_s: float,
     recording: Path,
+    rejected_frames: int,
 ) -> Summary:
     result = None if track is None else score(track, scenario)
     closest = None if track is None else min_separation(track.position)
@@ -168,6 +177,6 @@ def _summary(
         scored_on="telemetry" if track is not None and track.measured else "truth",
         faults=faults(scenario),
         swarm_heading_error_deg=None if result is None else result.swarm_heading_error_deg,
-        rejected_frames=0,
+        rejected_frames=rejected_frames,
         problem=problem,
     )

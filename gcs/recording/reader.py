@@ -23,6 +23,8 @@ from gcs.track import Point, Track
 from scenarios import Scenario
 from wire.frames import Frame, Framer
 
+RECORDING = "run.mcap"
+"""A run's recording in its folder."""
 RECORD_SIZE_LIMIT = 64 << 20
 DAMAGE = (McapError, struct.error, LookupError, ValueError, TypeError, RuntimeError, OverflowError, MemoryError)
 """What a torn, flipped or foreign file makes the readers raise: mcap's own, LZ4's, and those of what they hand on."""
@@ -50,6 +52,11 @@ class RecordedTick(NamedTuple):
     received: list[Frame]
     sent: list[bytes]
     events: tuple[str, ...]
+
+
+def located(path: Path) -> Path:
+    """A recording, named by itself or by the folder of its run."""
+    return path / RECORDING if path.is_dir() else path
 
 
 def read(path: Path) -> Flown:

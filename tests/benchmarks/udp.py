@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gcs.recording.reader import read
-from gcs.session import RECORDING
+from gcs.recording.reader import RECORDING, read
 
 REPETITIONS = 5
 LINK = "127.0.0.1:14690"
