@@ -233,12 +233,16 @@ def _anchored(pilot: Pilot, now: Situation) -> Pilot:
 
 def _flyable(velocity_ned: Vector) -> Vector:
     """What a set-point may ask for: a huge one would wind the controller up for half a minute."""
-    north, east, down = velocity_ned
-    slower = min(1.0, OFFBOARD_SPEED / max(math.hypot(north, east), 1e-9))
-    return north * slower, east * slower, max(-OFFBOARD_CLIMB, min(OFFBOARD_DESCENT, down))
+    return _bounded(velocity_ned, OFFBOARD_SPEED, OFFBOARD_CLIMB, OFFBOARD_DESCENT)
 
 
 def _towards(anchor_ned: Vector, now: Situation) -> Vector:
     north, east, down = (HOLD_GAIN * (a - p) for a, p in zip(anchor_ned, now.position_ned, strict=True))
-    slower = min(1.0, HOLD_SPEED / max(math.hypot(north, east), 1e-9))
-    return north * slower, east * slower, max(-HOLD_SPEED, min(HOLD_SPEED, down))
+    return _bounded((north, east, down), HOLD_SPEED, HOLD_SPEED, HOLD_SPEED)
+
+
+def _bounded(velocity_ned: Vector, level: float, climb: float, descent: float) -> Vector:
+    """A velocity no faster than these [m/s] on the level, up and down."""
+    north, east, down = velocity_ned
+    slower = min(1.0, level / max(math.hypot(north, east), 1e-9))
+    return north * slower, east * slower, max(-climb, min(descent, down))
