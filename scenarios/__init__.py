@@ -1,8 +1,9 @@
 """Scenarios: what is flown, by whom, what goes wrong, what counts as success. Data and a loader."""
 
+from scenarios.faults import Fault, MotorDegradation, RotorFault
 from scenarios.layout import healthy_robots, offsets_ne
 from scenarios.loading import ScenarioError, find, load, names, parse
-from scenarios.models import Fault, Leg, MotorDegradation, Redirect, RotorFault, Scenario, direction
+from scenarios.models import Leg, Redirect, Scenario, direction
 
 __all__ = [
     "Fault",

@@ -9,19 +9,10 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-Fraction = Annotated[float, Field(ge=0, le=1)]
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Heading = Annotated[float, Field(ge=-360, le=360)]
-Likert = Annotated[float, Field(ge=1, le=5)]
-
-
-class Section(BaseModel):
-    """One table of the file: no unknown key, no change after loading, no NaN or infinity."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True)
+from scenarios.faults import AnyFault, MotorDegradation
+from scenarios.section import Fraction, Heading, Likert, NotNegative, Positive, Section
 
 
 class Time(Section):
@@ -124,49 +115,6 @@ class Redirect(Section):
     task: str
     heading_deg: Heading
     length_m: Positive
-
-
-class Fault(Section):
-    """What every fault has: whom it strikes, and when."""
-
-    vehicle: Annotated[int, Field(ge=1)]
-    onset_s: NotNegative = 0.0
-    end_s: Positive | None = None
-    """Never, if absent."""
-
-    @model_validator(mode="after")
-    def _ends_after_onset(self) -> Fault:
-        if self.end_s is not None and self.end_s <= self.onset_s:
-            raise ValueError(f"end_s = {self.end_s} is not after onset_s = {self.onset_s}")
-        return self
-
-    def active(self, time_s: float) -> bool:
-        """Whether the fault acts at this time since mission start [s]."""
-        return self.onset_s <= time_s and (self.end_s is None or time_s < self.end_s)
-
-
-class MotorDegradation(Fault):
-    """The paper's fault: a restricted maximum speed and a fixed offset across the direction of flight."""
-
-    kind: Literal["motor_degradation"]
-    max_speed_fraction: Fraction = 0.4
-    """Of cruise: the paper flies 0.4 and 0.7."""
-    offset_fraction: Fraction = 0.47
-    """Of cruise, to the left of the commanded direction."""
-
-
-class RotorFault(Fault):
-    """A physical fault of one rotor: what it does to the flight is up to the flight model."""
-
-    kind: Literal["rotor"]
-    rotor: Annotated[int, Field(ge=1, le=4)]
-    efficiency: Fraction = 1.0
-    """Of the healthy thrust at the same speed."""
-    speed_limit: Fraction = 1.0
-    """Of the healthy maximum speed."""
-
-
-AnyFault = Annotated[MotorDegradation | RotorFault, Field(discriminator="kind")]
 
 
 class Control(Section):
