@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from scenarios import Scenario, offsets_ne
+from trustr.consensus import RULES
 from trustr.controller import Settings
 
 REFERENCE_RESPONSE_S = 0.25
@@ -19,7 +20,7 @@ def settings(scenario: Scenario) -> Settings:
     recommended = control.profile == "recommended"
     slower = control.response_time_s / REFERENCE_RESPONSE_S if recommended else 1.0
     return Settings(
-        rule=control.rule,
+        rule=RULES[control.rule],
         offset_ne=offsets_ne(scenario),
         leaders=np.array(scenario.swarm.leaders) - 1,
         c1=control.c1 * slower,

@@ -18,6 +18,7 @@ from gcs.autopilots import Px4
 from gcs.beliefs import trust_source
 from gcs.commands import Beat, Command, SetVelocity
 from gcs.control import settings
+from gcs.events import Rating
 from gcs.flight_state import (
     BEFORE_MISSION,
     Asked,
@@ -66,8 +67,9 @@ Step = tuple[FlightState, Commands, Diagnosis]
 class Flight:
     """Decides one flight of a scenario."""
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, *, ratings: Iterable[Rating] = ()) -> None:
         self.scenario = scenario
+        self._ratings = tuple(ratings)
         self.ids = tuple(range(1, scenario.swarm.count + 1))
         self.plan = mission.plan(scenario)
         self._settings = settings(scenario)
@@ -186,9 +188,10 @@ class Flight:
         diagnosis = self._overview(state, swarm)
         flying = obeying & ~self._down(swarm)
         heard = flying & swarm.fresh(now_ns, within_ns=STALE_NS)
-        observation = Observation(diagnosis.position_ne, swarm.velocity_ned[:, :2], heard, diagnosis.trust)
+        observation = Observation(diagnosis.position_ne, swarm.velocity_ned[:, :2], heard, diagnosis.trust, time_s)
         assert diagnosis.virtual is not None
-        decision = decide(observation, diagnosis.virtual, self._settings)
+        memory, decision = decide(state.memory, observation, diagnosis.virtual, self._settings)
+        state = replace(state, memory=memory)
         commanded = flying & swarm.fresh(now_ns, within_ns=LOST_NS)
         return self._steer(state, swarm, decision.velocity_ne, diagnosis, decision, commanded)
 

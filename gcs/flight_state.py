@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from gcs.commands import Command
 from gcs.swarm_frame import SwarmFrame
-from trustr.controller import Decision
+from trustr.controller import Decision, Memory
 from trustr.leader import VirtualLeader
 
 Array = npt.NDArray[np.float64]
@@ -58,6 +58,8 @@ class FlightState:
     shift_ne: Array | None = None
     """(N, 2) m: add to a position in a vehicle's own frame, get the swarm's."""
     mission_tick: int | None = None
+    memory: Memory | None = None
+    """What the controller keeps from tick to tick; None before the mission."""
     problem: str | None = None
     """Why the flight could not be completed."""
 

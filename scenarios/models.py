@@ -7,9 +7,10 @@ Time 0 is mission start: every vehicle at altitude, cruising begins.
 from __future__ import annotations
 
 import math
+import re
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from scenarios.faults import AnyFault, MotorDegradation
 from scenarios.section import Fraction, Heading, Likert, NotNegative, Positive, Section
@@ -117,10 +118,15 @@ class Redirect(Section):
     length_m: Positive
 
 
+RULES = ("average", "trust-r", "median", "wmsr-1", "wmsr-2", "confidence-decay")
+"""Update rules that ship: eq. 1 and eq. 12 of the paper, and the baselines (`trustr/consensus.py`)."""
+
+
 class Control(Section):
     """The update rule and its parameters (reference values: `docs/reproduction.md`)."""
 
-    rule: Literal["average", "trust-r"] = "trust-r"
+    rule: str = "trust-r"
+    """A name of RULES, or package.module:function for a rule of your own (`docs/your-own-rule.md`)."""
     c1: NotNegative = 0.10
     """1/s: navigational feedback of position, eq. 11."""
     c2: NotNegative = 0.60
@@ -138,6 +144,13 @@ class Control(Section):
     """1/s: metres inside the radius to speed apart."""
     response_time_s: Positive = 0.47
     """Mean lag of the vehicles' answer to a velocity step, ∫ (1 − v/v_step) dt; `recommended` scales with it."""
+
+    @field_validator("rule")
+    @classmethod
+    def _known(cls, rule: str) -> str:
+        if rule not in RULES and not re.fullmatch(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*", rule):
+            raise ValueError(f"rule = {rule!r}: allowed are {', '.join(RULES)}, or package.module:function")
+        return rule
 
     @model_validator(mode="after")
     def _somebody_counts(self) -> Control:
@@ -168,12 +181,21 @@ class Network(Section):
 class Trust(Section):
     """Where trust comes from."""
 
-    source: Literal["truth", "ratings"] = "truth"
-    """The simulation's own knowledge of the fault, or the study's mean ratings."""
+    source: Literal["truth", "ratings", "auto", "fused"] = "truth"
+    """The simulation's own knowledge of the fault; what people say (without anyone to say it, the study's mean ratings);
+    what the swarm's own behaviour shows; or both together."""
     faulty_rating: Likert = 1.94
     """Mean rating of the failed robot in the user study, 1 to 5."""
     others_rating: Likert = 3.83
     """Mean rating of the repaired swarm in the user study, 1 to 5."""
+
+    age_out_s: Positive = 20.0
+    """Time in which a rating's say falls to 1/e."""
+    hand_over: bool = True
+    """A distrusted leader passes its role to the most trusted follower."""
+    beyond_repair: Literal["keep", "hold", "land"] = "keep"
+    """What becomes of a robot whose trust stays below 0.05 for 5 s: it is kept, or left behind, holding below the
+    others or landing."""
 
 
 class Noise(Section):

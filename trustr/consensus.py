@@ -1,11 +1,13 @@
 """Update rules by name: what velocity a robot takes over from those it hears.
 
-A rule maps (graph, trust, settings) to one weight an edge; all of them are weighted means.
+A rule maps what was heard to an `Agreement`. The paper's two are weighted means; `docs/your-own-rule.md` shows how to
+fly one of your own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -16,20 +18,48 @@ from trustr.network import Array, Graph, communication_quality, normalised
 if TYPE_CHECKING:
     from trustr.controller import Settings
 
-Rule = Callable[[Graph, Array, "Settings"], Array]
-"""(graph, trust (N,), settings) → weights (E,), rows summing to 1."""
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Heard:
+    """What a rule may go by."""
+
+    graph: Graph
+    """Who hears whom; each robot hears itself."""
+    velocity_ne: Array
+    """(N, 2) m/s, measured; zero for robots that nobody hears."""
+    trust: Array
+    """(N,) in [0, 1]."""
+    time_s: float
+    """Since mission start."""
+    first_ne: Array
+    """(N, 2) m/s: the velocities at the mission's first tick."""
+    standing: Array
+    """(N,) s: ∫ (trust − ½) dt since mission start; who has more trust than doubt behind it is above 0."""
 
 
-def average(graph: Graph, _trust: Array, _settings: Settings) -> Array:
+@dataclass(frozen=True, slots=True, eq=False)
+class Agreement:
+    """What a rule makes of it."""
+
+    velocity_ne: Array
+    """(N, 2) m/s for each robot to take over."""
+    weights: Array
+    """(E,) how much each edge counted, each robot's summing to 1; a rule that picks by axis gives the mean of the two."""
+
+
+Rule = Callable[[Heard, "Settings"], Agreement]
+
+
+def average(heard: Heard, _settings: Settings) -> Agreement:
     """Eq. 1: every robot heard, and the robot itself, counts the same: 1 / (|N_i| + 1)."""
-    return normalised(graph, np.ones(len(graph.sender)))
+    return agreed(heard, normalised(heard.graph, np.ones(len(heard.graph.sender))))
 
 
-def trust_r(graph: Graph, trust: Array, settings: Settings) -> Array:
+def trust_r(heard: Heard, settings: Settings) -> Agreement:
     """Eq. 12 with the weights of eq. 17 and the communication quality of eq. 13."""
     quality = communication_quality(
-        graph,
-        trust,
+        heard.graph,
+        heard.trust,
         range_m=settings.range_m,
         best_range_m=settings.best_range_m,
         decay=settings.decay,
@@ -37,15 +67,20 @@ def trust_r(graph: Graph, trust: Array, settings: Settings) -> Array:
         threshold=settings.threshold,
         weights=settings.weights,
     )
-    return normalised(graph, quality)
+    return agreed(heard, normalised(heard.graph, quality))
 
 
 RULES: Mapping[str, Rule] = MappingProxyType({"average": average, "trust-r": trust_r})
 
 
-def weighted_mean(graph: Graph, weights: Array, velocity_ne: Array) -> Array:
-    """Eq. 12: u_i = Σ_k w_k v_k over k ∈ {i} ∪ N_i, (N, 2) m/s, from measured velocities (N, 2) m/s."""
-    mean = np.empty_like(velocity_ne)
+def agreed(heard: Heard, weights: Array) -> Agreement:
+    """What weights (E,) come to, as a weighted mean of the velocities heard."""
+    return Agreement(weighted_mean(heard.graph, weights, heard.velocity_ne), weights)
+
+
+def weighted_mean(graph: Graph, weights: Array, vectors_ne: Array) -> Array:
+    """Eq. 12: u_i = Σ_k w_k v_k over k ∈ {i} ∪ N_i, (N, 2), from vectors (N, 2)."""
+    mean = np.empty_like(vectors_ne)
     for axis in range(2):
-        mean[:, axis] = graph.sum_by_receiver(weights * velocity_ne[graph.sender, axis])
+        mean[:, axis] = graph.sum_by_receiver(weights * vectors_ne[graph.sender, axis])
     return mean

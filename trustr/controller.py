@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from trustr.consensus import RULES, weighted_mean
+from trustr.consensus import Heard, Rule, weighted_mean
 from trustr.leader import VirtualLeader, navigational_feedback
 from trustr.network import Array, Graph, neighbours
 from trustr.separation import separation
@@ -18,8 +18,8 @@ from trustr.separation import separation
 class Settings:
     """What stays the same through a flight."""
 
-    rule: str
-    """A name of `consensus.RULES`."""
+    rule: Rule
+    """One of `consensus.RULES`, or a researcher's own."""
     offset_ne: Array
     """(N, 2) m, each robot's place in the formation."""
     leaders: npt.NDArray[np.intp]
@@ -65,6 +65,22 @@ class Observation:
     """(N,) False where data are stale, missing or not finite."""
     trust: Array
     """(N,) in [0, 1]."""
+    time_s: float = 0.0
+    """Since mission start."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Memory:
+    """What one tick leaves to the next."""
+
+    time_s: float
+    """Of that tick, since mission start."""
+    first_ne: Array
+    """(N, 2) m/s: the velocities of the mission's first tick."""
+    standing: Array
+    """(N,) s: ∫ (trust − ½) dt."""
+    leaders: npt.NDArray[np.intp]
+    """(L,) who has the leaders' role."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,9 +94,12 @@ class Decision:
     """(E,) one for each edge of the graph."""
 
 
-def decide(observation: Observation, virtual: VirtualLeader, settings: Settings) -> Decision:
-    """Eq. 11 and 12 (or eq. 1) for all robots at once, separation added.
+def decide(
+    memory: Memory | None, observation: Observation, virtual: VirtualLeader, settings: Settings
+) -> tuple[Memory, Decision]:
+    """Eq. 11 and 12 (or another rule than eq. 12) for all robots at once, separation added.
 
+    memory: what the tick before returned; None at the first.
     A robot that is not heard has weight exactly 0 with every other, and is commanded to stand still.
     """
     heard = (
@@ -88,10 +107,13 @@ def decide(observation: Observation, virtual: VirtualLeader, settings: Settings)
     )
     position, velocity = _of_the_heard(observation.position_ne, heard), _of_the_heard(observation.velocity_ne, heard)
     graph = neighbours(position, heard, range_m=settings.range_m)
-    weights = RULES[settings.rule](graph, observation.trust, settings)
-    consensus = weighted_mean(graph, weights, velocity)
+    memory = _remembered(memory, observation, velocity, settings)
+    agreement = settings.rule(
+        Heard(graph, velocity, observation.trust, observation.time_s, memory.first_ne, memory.standing), settings
+    )
+    weights, consensus = agreement.weights, agreement.velocity_ne
     command = consensus.copy()
-    leaders, place = settings.leaders, position - settings.offset_ne
+    leaders, place = memory.leaders, position - settings.offset_ne
     if settings.swarm_feedback:
         # Followers know no path: whatever the leaders' feedback sums up to shears the formation and stays, and the mean
         # is off by it. So leaders answer for the mean, and the formation closes up (docs/recommended-profile.md).
@@ -118,7 +140,16 @@ def decide(observation: Observation, virtual: VirtualLeader, settings: Settings)
             cap=settings.feedback_cap,
         )
     command += separation(graph, position, radius=settings.separation_radius, gain=settings.separation_gain)
-    return Decision(_of_the_heard(command, heard), graph, weights)
+    return memory, Decision(_of_the_heard(command, heard), graph, weights)
+
+
+def _remembered(memory: Memory | None, observation: Observation, velocity: Array, settings: Settings) -> Memory:
+    """The memory this tick decides with, and leaves."""
+    if memory is None:
+        return Memory(observation.time_s, velocity, np.zeros(len(velocity)), settings.leaders)
+    dt = observation.time_s - memory.time_s
+    standing = memory.standing + (observation.trust - 0.5) * dt
+    return Memory(observation.time_s, memory.first_ne, standing, memory.leaders)
 
 
 def _of_the_heard(vectors: Array, heard: npt.NDArray[np.bool_]) -> Array:
