@@ -9,6 +9,7 @@ from unittest.mock import patch
 import numpy as np
 
 from trustr import network
+from trustr.consensus import RULES
 from trustr.controller import Observation, Settings, decide
 from trustr.leader import VirtualLeader
 
@@ -37,19 +38,19 @@ def _tick_ms(count: int, range_m: float, dense_below: int) -> tuple[float, int]:
         np.where(rng.random(count) < 0.1, 0.0, 1.0),
     )
     settings = Settings(
-        rule="trust-r", offset_ne=offset, leaders=np.array([0, side - 1]), c1=0.1, c2=0.6, feedback_cap=0.375,
+        rule=RULES["trust-r"], offset_ne=offset, leaders=np.array([0, side - 1]), c1=0.1, c2=0.6, feedback_cap=0.375,
         response_s=0.0, swarm_feedback=False, formation_gain=0.0, range_m=range_m, best_range_m=6.0, decay=2.0,
         weights="sender", eta=0.05, threshold=0.5, separation_radius=2.0, separation_gain=0.3,
     )  # fmt: skip
     virtual = VirtualLeader(np.zeros(2), np.array([1.5, 0.0]), np.zeros(2))
     with patch.object(network, "DENSE_BELOW", dense_below):
-        edges = len(decide(observation, virtual, settings).weights)
+        memory, decision = decide(None, observation, virtual, settings)
         took = []
         for _ in range(max(5, 3000 // count)):
             start = time.perf_counter()
-            decide(observation, virtual, settings)
+            decide(memory, observation, virtual, settings)
             took.append(time.perf_counter() - start)
-    return statistics.median(took) * 1e3, edges
+    return statistics.median(took) * 1e3, len(decision.weights)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,8 @@ from hypothesis.extra.numpy import arrays
 
 from gcs.control import settings
 from scenarios import load
-from trustr.controller import Observation, decide
+from trustr.controller import Observation
+from trustr.controller import decide as remember_and_decide
 from trustr.leader import VirtualLeader
 from trustr.separation import separation
 
@@ -21,6 +22,11 @@ VIRTUAL = VirtualLeader(np.array([3.0, 4.0]), np.array([1.2, 0.9]), np.array([0.
 REST = VirtualLeader(*np.zeros((3, 2)))
 
 profiles = pytest.mark.parametrize("profile", PROFILES)
+
+
+def decide(observation, virtual, chosen, memory=None):
+    """The decision of one tick, the mission's first unless there is a memory."""
+    return remember_and_decide(memory, observation, virtual, chosen)[1]
 
 
 @st.composite

@@ -32,6 +32,7 @@ def flown(told, *, seed=None):
     noise = told.noise if seed is not None else type(told.noise)()
     gust, calm = np.zeros((count, 2)), exp(-TICK / noise.gust_time_s)
     position, velocity = offset.copy(), np.tile(path.segments[0].velocity_ne, (count, 1))
+    memory = None
     read_out, hand_over = (round(seconds / TICK + 0.4999) for seconds in (path.read_out_s, path.hand_over_s))
     for tick in range(read_out):
         if tick == hand_over:
@@ -41,8 +42,10 @@ def flown(told, *, seed=None):
             velocity + noise.velocity_m_s * rng.standard_normal((count, 2)),
             np.ones(count, bool),
             healthy.astype(float),
+            tick * TICK,
         )
-        command = decide(observed, leader(path, tick * TICK), chosen).velocity_ne
+        memory, decision = decide(memory, observed, leader(path, tick * TICK), chosen)
+        command = decision.velocity_ne
         for fault in told.fault:
             row = fault.vehicle - 1
             command[row] = degrade(
