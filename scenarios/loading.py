@@ -71,18 +71,18 @@ def parse(text: str, *, source: str, overrides: Sequence[str] = ()) -> Scenario:
         raise ScenarioError(f"{source}: {'; '.join(explain(error, tables))}") from None
 
 
-def explain(error: ValidationError, tables: dict[str, Any]) -> list[str]:
-    """One clause for each thing wrong: the key, the value and what is allowed."""
-    return [_clause(problem, tables) for problem in error.errors(include_url=False)]
+def explain(error: ValidationError, tables: dict[str, Any], model: type[BaseModel] = Scenario) -> list[str]:
+    """One clause for each thing wrong: the key, the value and what is allowed. model: of the whole file."""
+    return [_clause(problem, tables, model) for problem in error.errors(include_url=False)]
 
 
-def _clause(problem: Any, tables: dict[str, Any]) -> str:
+def _clause(problem: Any, tables: dict[str, Any], model: type[BaseModel]) -> str:
     location = list(problem["loc"])
     if location[:1] == ["fault"] and len(location) > 2:
         del location[2]  # pydantic puts the kind of a union's member into the path; people did not type it
     key = ".".join(map(str, location))
     if problem["type"] == "extra_forbidden":
-        allowed = _allowed_keys(tables, location[:-1])
+        allowed = _allowed_keys(tables, location[:-1], model)
         close = difflib.get_close_matches(str(location[-1]), allowed, n=1)
         hint = f"did you mean {close[0]}? " if close else ""
         return f"{key} = {problem['input']!r}: there is no such key; {hint}allowed here: {', '.join(allowed)}"
@@ -102,9 +102,9 @@ def _clause(problem: Any, tables: dict[str, Any]) -> str:
     return f"{key} = {problem['input']!r}: {message}"
 
 
-def _allowed_keys(tables: dict[str, Any], location: Sequence[Any]) -> list[str]:
+def _allowed_keys(tables: dict[str, Any], location: Sequence[Any], model: type[BaseModel]) -> list[str]:
     """Keys of the model at this place of the file."""
-    models: list[type[BaseModel]] = [Scenario]
+    models: list[type[BaseModel]] = [model]
     value: Any = tables
     for part in location:
         value = value[part]
