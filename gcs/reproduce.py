@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import math
-import statistics
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import orjson
 from joblib import Parallel, delayed
 from rich import box
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from gcs.flight import Flight
-from gcs.lockstep import Lockstep
-from gcs.loop import fly
-from gcs.scoring import Score, score
-from gcs.track import Tracker
-from gcs.truth import Truth
+from gcs.scoring import Score
+from gcs.statistics import Spread
+from gcs.trial import attempt
 from scenarios import Scenario, load
 
 SCENARIOS = ("transit", "emergency")
@@ -50,27 +45,6 @@ class Condition:
         overrides = (f'control.rule="{self.controller}"', f'control.profile="{self.profile}"', 'trust.source="truth"')
         loaded = load(self.scenario, overrides=overrides)
         return loaded.without_faults() if self.severity is None else loaded.with_severity(self.severity)
-
-
-@dataclass(frozen=True, slots=True)
-class Spread:
-    """A figure over seeds."""
-
-    mean: float
-    ci95: float
-    """Half the 95 % interval of the mean (Student's t)."""
-    p90: float
-
-    @staticmethod
-    def of(values: list[float]) -> Spread:
-        """Of one value a seed."""
-        from scipy import stats
-
-        n = len(values)
-        if n == 1:
-            return Spread(values[0], float("nan"), values[0])
-        half = float(stats.t.ppf(0.975, n - 1)) * statistics.stdev(values) / n**0.5
-        return Spread(statistics.fmean(values), half, float(np.percentile(values, 90)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,18 +134,12 @@ class FlightNotCompleted(RuntimeError):
 
 
 def one_flight(condition: Condition, seed: int) -> Score:
-    """Fly one condition once, in lockstep, take-off to landing."""
-    scenario = condition.build()
-    flight = Flight(scenario)
-    truth = Truth(flight.ids)
-    tracker = Tracker(flight, truth)
-    world = Lockstep.of(scenario, seed=seed)
-    state = fly(world, world, flight, (truth, tracker), period_ns=scenario.time.period_ns)
-    result = None if tracker.track is None else score(tracker.track, scenario)
-    if result is None or state.problem is not None:
+    """Fly one condition once, to its read-out. Raises FlightNotCompleted."""
+    trial = attempt(condition.build(), seed=seed)
+    if trial.score is None or trial.problem is not None:
         what = f"{condition.scenario}, {condition.controller}, severity {condition.severity}, {condition.profile}"
-        raise FlightNotCompleted(f"{what}, seed {seed}: {state.problem or 'ended before its read-out'}")
-    return result
+        raise FlightNotCompleted(f"{what}, seed {seed}: {trial.problem}")
+    return trial.score
 
 
 def _row(condition: Condition, scores: list[Score]) -> Row:

@@ -2,7 +2,6 @@
 
 from functools import cache
 from io import StringIO
-from math import isnan
 from statistics import fmean
 
 import numpy as np
@@ -10,9 +9,8 @@ import orjson
 import pytest
 from flights import SEEDS
 from rich.console import Console
-from scipy import stats
 
-from gcs.reproduce import PAPER, Condition, Spread, conditions, one_flight, reproduce
+from gcs.reproduce import PAPER, Condition, conditions, one_flight, reproduce
 
 NAMES = ("transit", "emergency")
 SEVERITIES = (0.4, 0.7)
@@ -138,13 +136,3 @@ def test_files_and_tables_say_the_same(tmp_path):
         assert f"{row.heading_error_deg.mean:.2f}°" in text
         assert "4°, 3.2 m" in text
         assert "nan" not in text
-
-
-def test_the_interval_is_students_t():
-    values = [1.0, 2.0, 4.0, 5.0]
-    spread = Spread.of(values)
-    low, high = stats.t.interval(0.95, 3, loc=3.0, scale=stats.sem(values))
-    assert spread.mean == 3.0
-    assert (3.0 - spread.ci95, 3.0 + spread.ci95) == pytest.approx((low, high))
-    assert spread.p90 == pytest.approx(4.7)  # a tenth from the end of three gaps
-    assert isnan(Spread.of([1.0]).ci95)
