@@ -38,3 +38,5 @@ def settings(scenario: Scenario) -> Settings:
         separation_radius=control.separation_radius_m,
         separation_gain=control.separation_gain,
     )
+        confidence=control.confidence,
+        confidence_decay=control.confidence_decay,

@@ -138,6 +138,10 @@ class Control(Section):
     eta: Fraction = 0.05
     """η of a sender whose trust is below the threshold."""
     threshold: Fraction = 0.5
+    confidence: Fraction = 0.9
+    """c of `confidence-decay`: the part of its first velocity in what a robot is commanded at mission start."""
+    confidence_decay: Positive = 0.5
+    """1/s: γ of `confidence-decay`, how fast that part falls."""
     profile: Literal["paper", "recommended"] = "paper"
     separation_radius_m: NotNegative = 2.0
     separation_gain: NotNegative = 0.3

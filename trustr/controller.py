@@ -54,6 +54,10 @@ class Settings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+    confidence: float
+    """c of λ_t = c e^(−γt), the rule `confidence-decay`."""
+    confidence_decay: float
+    """1/s: γ of the same."""
 class Observation:
     """What a tick knows: measured, in the swarm's NED frame, horizontal."""
 
