@@ -1,45 +1,162 @@
-"""Where trust comes from: functions of the time since mission start that return one trust a robot.
+"""Where trust comes from: a fold, tick by tick, of what was commanded, measured and said, into one trust a robot.
 
-`truth` is the simulation's own knowledge of the faults, `ratings` the user study's mean ratings. Before the mission
-every robot is trusted.
+`truth` is the simulation's own knowledge of the faults; `auto` what the swarm's behaviour shows; `ratings` what people
+say of it, and where nobody says anything the user study's mean ratings; `fused` is `auto` and `ratings` together.
+Before the mission every robot is trusted.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from gcs.control import settings
+from gcs.events import Rating
+from gcs.telemetry import NEVER
 from scenarios import Scenario, healthy_robots
-from trustr.rating import study_trust
+from trustr.evidence import PRIOR, Evidence, Watch, trust_of, weigh
+from trustr.network import neighbours
+from trustr.rating import CAP, aged, study_trust, told
+from trustr.response import Response
 
 Array = npt.NDArray[np.float64]
-TrustSource = Callable[[float], Array]
-"""Time since mission start [s] → trust (N,) in [0, 1]."""
+Flags = npt.NDArray[np.bool_]
+
+SAYS_ALL = 6.0
+"""Log odds that ratings may come to where nothing else is asked."""
+AN_ALLOWANCE_FOR_PLACE = 1.0
+"""m off its place, as far as a robot's way back may set it apart from its neighbours."""
 
 
-def trust_source(scenario: Scenario) -> TrustSource:
-    """The source a scenario names."""
-    return {"truth": _truth, "ratings": _ratings}[scenario.trust.source](scenario)
+@dataclass(frozen=True, slots=True, eq=False)
+class Belief:
+    """What is believed of N robots, and from what."""
+
+    spoken: Array
+    """(N,) log odds of being faulty, from ratings alone."""
+    position_ns: npt.NDArray[np.int64]
+    """(N,) when the newest telemetry that was weighed arrived."""
+    evidence: Evidence | None = None
+    """From behaviour; None until set-points flow, and where the source does not ask for it."""
 
 
-def _truth(scenario: Scenario) -> TrustSource:
-    """0 for a robot while one of its faults is active, else 1."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """What a tick shows."""
 
-    def trust(time_s: float) -> Array:
-        believed = np.ones(scenario.swarm.count)
-        for fault in scenario.fault:
-            if fault.active(time_s):
+    mission_s: float
+    """Since mission start; NaN before."""
+    commanded_ne: Array
+    """(N, 2) m/s: the set-points sent at the tick before."""
+    position_ne: Array
+    """(N, 2) m, measured."""
+    velocity_ne: Array
+    """(N, 2) m/s, measured."""
+    position_ns: npt.NDArray[np.int64]
+    """(N,) when both arrived."""
+    heard: Flags
+    """(N,) fresh, and under our control."""
+    ratings: Sequence[Rating]
+    """What was said since."""
+
+
+class Beliefs:
+    """The trust source of one flight."""
+
+    def __init__(self, scenario: Scenario, *, rated: bool) -> None:
+        trust = scenario.trust
+        self._scenario = scenario
+        self._source = trust.source
+        self._watches = trust.source in ("auto", "fused")
+        self._listens = trust.source == "fused" or (trust.source == "ratings" and rated)
+        self._cap = CAP if self._watches else SAYS_ALL
+        self._watch = watch(scenario)
+        self._study = study_trust(
+            ~healthy_robots(scenario), faulty_rating=trust.faulty_rating, others_rating=trust.others_rating
+        )
+
+    def start(self) -> Belief:
+        """Nothing has been seen."""
+        count = self._scenario.swarm.count
+        return Belief(np.zeros(count), np.full(count, NEVER))
+
+    def update(self, belief: Belief, seen: Seen) -> Belief:
+        """What is believed after one more tick."""
+        spoken = aged(belief.spoken, dt=self._watch.dt, age_out_s=self._scenario.trust.age_out_s)
+        for rating in seen.ratings if self._listens else ():
+            row = None if rating.vehicle is None else rating.vehicle - 1
+            suspicion = 1.0 - trust_of(_odds(belief))
+            spoken = told(spoken, suspicion, rating.rating, row, cap=self._cap)
+            belief = replace(belief, spoken=spoken)
+        return self._watched(replace(belief, spoken=spoken), seen) if self._watches else replace(belief, spoken=spoken)
+
+    def trust(self, belief: Belief, mission_s: float) -> Array:
+        """(N,) in [0, 1] at this time since mission start."""
+        if self._source == "truth":
+            return self._truth(mission_s)
+        if self._source == "ratings" and not self._listens:
+            return self._study
+        return trust_of(_odds(belief))
+
+    def forgive(self, belief: Belief, robots: Flags) -> Belief:
+        """Of these robots (N,), think as of robots nothing is known of."""
+        if belief.evidence is None:
+            return belief
+        odds = np.where(robots, PRIOR, belief.evidence.log_odds)
+        return replace(belief, evidence=replace(belief.evidence, log_odds=odds))
+
+    def _watched(self, belief: Belief, seen: Seen) -> Belief:
+        here = seen.heard & np.isfinite(seen.position_ne).all(1) & np.isfinite(seen.velocity_ne).all(1)
+        if belief.evidence is None:
+            if not here.all():
+                return belief
+            evidence = Evidence.start(
+                self._watch,
+                commanded_ne=seen.commanded_ne,
+                position_ne=seen.position_ne,
+                velocity_ne=seen.velocity_ne,
+            )
+            return replace(belief, evidence=evidence, position_ns=seen.position_ns)
+        position, velocity = (np.where(here[:, None], x, 0.0) for x in (seen.position_ne, seen.velocity_ne))
+        graph = None
+        if not np.isnan(seen.mission_s):
+            graph = neighbours(position, here, range_m=self._scenario.network.range_m)
+        evidence = weigh(
+            belief.evidence,
+            self._watch,
+            commanded_ne=seen.commanded_ne,
+            position_ne=position,
+            velocity_ne=velocity,
+            told=here & (seen.position_ns != belief.position_ns),
+            graph=graph,
+        )
+        return replace(belief, evidence=evidence, position_ns=seen.position_ns)
+
+    def _truth(self, mission_s: float) -> Array:
+        """0 for a robot while one of its faults is active, else 1."""
+        believed = np.ones(self._scenario.swarm.count)
+        for fault in self._scenario.fault:
+            if fault.active(mission_s):
                 believed[fault.vehicle - 1] = 0.0
         return believed
 
-    return trust
+
+def watch(scenario: Scenario) -> Watch:
+    """How healthy robots of a scenario behave."""
+    trust, control = scenario.trust, settings(scenario)
+    apart = control.feedback_cap + control.separation_gain * control.separation_radius
+    return Watch(
+        response=Response(trust.response_delay_s, trust.response_lag_s),
+        tolerance=trust.tolerance_m_s,
+        place_tolerance=trust.place_tolerance_m,
+        disagreement=apart + control.formation_gain * AN_ALLOWANCE_FOR_PLACE,
+        dt=scenario.time.period_s,
+    )
 
 
-def _ratings(scenario: Scenario) -> TrustSource:
-    """The study's means, all the flight long: one for robots that fail at any time in it, one for the others."""
-    rating = scenario.trust
-    faulty = ~healthy_robots(scenario)
-    fixed = study_trust(faulty, faulty_rating=rating.faulty_rating, others_rating=rating.others_rating)
-    return lambda _time_s: fixed
+def _odds(belief: Belief) -> Array:
+    """(N,) log odds of being faulty, all told."""
+    return belief.spoken + (PRIOR if belief.evidence is None else belief.evidence.log_odds)

@@ -14,15 +14,23 @@ FORMATION_GAIN = 0.3
 """1/s: how fast `recommended` lets robots return to their place among those they trust."""
 
 
+HEEDLESS = ("average", "median", "wmsr-1", "wmsr-2", "confidence-decay")
+"""Baselines: what trust does besides weighing, hand-over and leaving behind, is no part of them."""
+
+
 def settings(scenario: Scenario) -> Settings:
     """What the controller of this scenario's flight is bound to."""
     control, network, cruise = scenario.control, scenario.network, scenario.mission.cruise_m_s
+    swarm = scenario.swarm
     recommended = control.profile == "recommended"
     slower = control.response_time_s / REFERENCE_RESPONSE_S if recommended else 1.0
     return Settings(
         rule=RULES[control.rule],
         offset_ne=offsets_ne(scenario),
-        leaders=np.array(scenario.swarm.leaders) - 1,
+        files=tuple(np.arange(swarm.count).reshape(swarm.rows, swarm.columns).T),
+        leaders=np.array(swarm.leaders) - 1,
+        hand_over=scenario.trust.hand_over and control.rule not in HEEDLESS,
+        leave_behind=scenario.trust.beyond_repair != "keep" and control.rule not in HEEDLESS,
         c1=control.c1 * slower,
         c2=control.c2 * slower,
         feedback_cap=control.feedback_cap * slower * cruise,
@@ -35,8 +43,8 @@ def settings(scenario: Scenario) -> Settings:
         weights=control.weights,
         eta=control.eta,
         threshold=control.threshold,
+        confidence=control.confidence,
+        confidence_decay=control.confidence_decay,
         separation_radius=control.separation_radius_m,
         separation_gain=control.separation_gain,
     )
-        confidence=control.confidence,
-        confidence_decay=control.confidence_decay,

@@ -15,10 +15,10 @@ import numpy.typing as npt
 
 from gcs import mission
 from gcs.autopilots import Px4
-from gcs.beliefs import trust_source
+from gcs.beliefs import Beliefs, Seen
 from gcs.commands import Beat, Command, SetVelocity
 from gcs.control import settings
-from gcs.events import Rating
+from gcs.events import LAND, Event, Rating
 from gcs.flight_state import (
     BEFORE_MISSION,
     Asked,
@@ -35,6 +35,7 @@ from gcs.telemetry import Swarm
 from scenarios import Scenario, offsets_ne
 from trustr.controller import Decision, Observation, decide
 from trustr.leader import VirtualLeader, capped
+from trustr.roles import taken_back
 
 Array = npt.NDArray[np.float64]
 Commands = list[tuple[int, Command]]
@@ -57,6 +58,12 @@ DOWN_BELOW = 0.25
 """Of the altitude to be held: a vehicle lower than that in a mission has come down."""
 TOLD_S = 2.0
 """A heartbeat is a second apart: what it says is believed this long after it may have changed."""
+STEERED = (Phase.TAKE_CONTROL, Phase.RUN_UP, Phase.MISSION)
+"""Phases in which set-points flow."""
+TAKES_BACK = 4
+"""A rating from which the supervisor wants a robot back that was left behind."""
+BELOW = 3.0
+"""m under the others: where robots go that are left behind."""
 RUN_UP_GAIN, RUN_UP_CAP = 0.5, 0.5
 """1/s and m/s: every robot to its place beside the moving origin."""
 
@@ -67,14 +74,15 @@ Step = tuple[FlightState, Commands, Diagnosis]
 class Flight:
     """Decides one flight of a scenario."""
 
-    def __init__(self, scenario: Scenario, *, ratings: Iterable[Rating] = ()) -> None:
+    def __init__(self, scenario: Scenario, *, ratings: Iterable[Rating] | None = None) -> None:
+        """ratings: what people will say, with time_s each; () if they may say something live, None if nobody does."""
         self.scenario = scenario
-        self._ratings = tuple(ratings)
+        self._schedule = _by_tick(scenario, ratings or ())
         self.ids = tuple(range(1, scenario.swarm.count + 1))
         self.plan = mission.plan(scenario)
         self._settings = settings(scenario)
         self._offset_ne = offsets_ne(scenario)
-        self._trust = trust_source(scenario)
+        self._beliefs = Beliefs(scenario, rated=ratings is not None)
         self._leader = mission.PROFILES[scenario.control.profile]
         position_s = scenario.time.period_s / (scenario.time.positions_per_tick or 1)
         self._autopilot = Px4(height_m=scenario.swarm.altitude_m, position_s=position_s)
@@ -94,17 +102,51 @@ class Flight:
     def start(self) -> FlightState:
         """Before the first tick."""
         n = len(self.ids)
-        return FlightState(tick=0, phase=Phase.JOIN, phase_tick=0, asked=(Asked(),) * n, sent_ned=np.zeros((n, 3)))
+        return FlightState(
+            tick=0,
+            phase=Phase.JOIN,
+            phase_tick=0,
+            asked=(Asked(),) * n,
+            sent_ned=np.zeros((n, 3)),
+            belief=self._beliefs.start(),
+        )
 
-    def __call__(self, state: FlightState, swarm: Swarm, events: Iterable[str], now_ns: int) -> Step:
-        """One tick. events: what an operator asked for since the last; "land" ends the flight."""
-        if "land" in events and state.phase not in (Phase.LAND, Phase.DONE):
+    def __call__(self, state: FlightState, swarm: Swarm, events: Iterable[Event], now_ns: int) -> Step:
+        """One tick. events: what people said since the last; LAND ends the flight."""
+        if LAND in events and state.phase not in (Phase.LAND, Phase.DONE):
             state = abandoned(state)
         state = self._watch(state, swarm, now_ns)
+        said = (*self._due(state), *(event for event in events if isinstance(event, Rating)))
+        if state.phase in STEERED:
+            state = self._believe(state, swarm, said, now_ns)
         state, commands, diagnosis = self._phases[state.phase](state, swarm, now_ns)
         if state.tick % self.scenario.time.ticks(1.0) == 0:
             commands = [(system, Beat()) for system in self.ids] + commands
-        return replace(state, tick=state.tick + 1), commands, diagnosis
+        return replace(state, tick=state.tick + 1), commands, replace(diagnosis, ratings=said)
+
+    def _due(self, state: FlightState) -> tuple[Rating, ...]:
+        """Ratings known beforehand that count at this tick."""
+        return () if state.mission_tick is None else self._schedule.get(state.tick - state.mission_tick, ())
+
+    def _believe(self, state: FlightState, swarm: Swarm, said: tuple[Rating, ...], now_ns: int) -> FlightState:
+        """Weigh what the tick shows; who was left behind is taken back where the supervisor says so."""
+        seen = Seen(
+            mission_s=self._mission_s(state),
+            commanded_ne=state.sent_ned[:, :2],
+            position_ne=self._position_ne(state, swarm),
+            velocity_ne=swarm.velocity_ned[:, :2],
+            position_ns=swarm.position_ns,
+            heard=self._autopilot.obeying(swarm) & swarm.fresh(now_ns, within_ns=STALE_NS),
+            ratings=said,
+        )
+        state = replace(state, belief=self._beliefs.update(state.belief, seen))
+        praised_ids = {rating.vehicle for rating in said if rating.rating >= TAKES_BACK}
+        praised = np.array([system in praised_ids for system in self.ids])
+        if state.memory is None or not (praised & state.memory.roles.left).any():
+            return state
+        wanted = praised & state.memory.roles.left
+        memory = replace(state.memory, roles=taken_back(state.memory.roles, wanted))
+        return replace(state, memory=memory, belief=self._beliefs.forgive(state.belief, wanted))
 
     def _watch(self, state: FlightState, swarm: Swarm, now_ns: int) -> FlightState:
         """Give up what takes too long, and a fleet that loses a vehicle before its mission."""
@@ -181,8 +223,7 @@ class Flight:
     def _mission(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
         time_s = self._mission_s(state)
         if time_s >= self.plan.read_out_s - 1e-9:
-            state = entered(state, Phase.LAND)
-            return self._land(state, swarm, now_ns)
+            return self._land(entered(state, Phase.LAND), swarm, now_ns)
         obeying = self._autopilot.obeying(swarm)
         state = self._note_the_lost(state, swarm, obeying, now_ns)
         diagnosis = self._overview(state, swarm)
@@ -193,7 +234,32 @@ class Flight:
         memory, decision = decide(state.memory, observation, diagnosis.virtual, self._settings)
         state = replace(state, memory=memory)
         commanded = flying & swarm.fresh(now_ns, within_ns=LOST_NS)
-        return self._steer(state, swarm, decision.velocity_ne, diagnosis, decision, commanded)
+        if not decision.roles.left.any():
+            return self._steer(state, swarm, decision.velocity_ne, diagnosis, decision, commanded)
+        return self._leave_behind(state, swarm, diagnosis, decision, commanded)
+
+    def _leave_behind(
+        self,
+        state: FlightState,
+        swarm: Swarm,
+        diagnosis: Diagnosis,
+        decision: Decision,
+        commanded: npt.NDArray[np.bool_],
+    ) -> Step:
+        """Steer; who was left behind sinks below the others while it goes along with them, and only there it stops."""
+        left = decision.roles.left
+        below = left & (-swarm.position_ned[:, 2] < self.scenario.swarm.altitude_m - 0.8 * BELOW)
+        commands: Commands = []
+        if self.scenario.trust.beyond_repair == "land":
+            state, commands, _ = self._ask(
+                state, swarm, lambda row: _some(self._autopilot.next_to_land(swarm, row)) if below[row] else ()
+            )
+            commanded = commanded & ~below
+        velocity = np.where(below[:, None], 0.0, decision.velocity_ne)
+        state, steering, diagnosis = self._steer(
+            state, swarm, velocity, diagnosis, decision, commanded, lower=np.where(left, BELOW, 0.0)
+        )
+        return state, commands + steering, diagnosis
 
     def _land(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
         heard = swarm.fresh(now_ns, within_ns=LOST_NS)
@@ -229,9 +295,11 @@ class Flight:
         diagnosis: Diagnosis,
         decision: Decision | None = None,
         commanded: npt.NDArray[np.bool_] | None = None,
+        *,
+        lower: Array | float = 0.0,
     ) -> Step:
-        """Add height and heading, pass the gate, send."""
-        height_error = swarm.position_ned[:, 2] + self.scenario.swarm.altitude_m
+        """Add height (so many metres lower than the scenario's) and heading, pass the gate, send."""
+        height_error = swarm.position_ned[:, 2] + self.scenario.swarm.altitude_m - lower
         down = np.clip(-HEIGHT_GAIN * height_error, -CLIMB_SPEED, CLIMB_SPEED)
         asked = np.empty_like(swarm.position_ned)
         asked[:, :2], asked[:, 2] = velocity_ne, down
@@ -251,8 +319,7 @@ class Flight:
 
     def _overview(self, state: FlightState, swarm: Swarm) -> Diagnosis:
         """What every phase has to say."""
-        position = swarm.position_ned[:, :2] + (np.nan if state.shift_ne is None else state.shift_ne)
-        time_s = self._mission_s(state)
+        position, time_s = self._position_ne(state, swarm), self._mission_s(state)
         if math.isnan(time_s):
             trust = np.ones(len(swarm.ids))
             return Diagnosis(state.phase, time_s, self.plan.segments[0].task, None, trust, None, position)
@@ -261,10 +328,15 @@ class Flight:
             mission_s=time_s,
             task=self.plan.segment_at(time_s).task,
             virtual=self._leader(self.plan, time_s),
-            trust=self._trust(time_s),
+            trust=self._beliefs.trust(state.belief, time_s),
             decision=None,
             position_ne=position,
+            belief=state.belief,
         )
+
+    def _position_ne(self, state: FlightState, swarm: Swarm) -> Array:
+        """(N, 2) m in the swarm's frame; NaN until that is known."""
+        return np.asarray(swarm.position_ned[:, :2] + (np.nan if state.shift_ne is None else state.shift_ne))
 
     def _heading(self, virtual: VirtualLeader | None) -> float:
         """Face the direction of travel; at its end, the last leg's."""
@@ -279,8 +351,10 @@ class Flight:
         """The first vehicle to fall silent, to come down or to leave our mode is why the flight is incomplete."""
         if state.problem is not None:
             return state
-        silent = ~swarm.fresh(now_ns, within_ns=LOST_NS)
-        down = self._down(swarm)
+        expected = np.zeros(len(swarm.ids), bool) if state.memory is None else state.memory.roles.left
+        silent = ~swarm.fresh(now_ns, within_ns=LOST_NS) & ~expected
+        down = self._down(swarm) & ~expected
+        obeying = obeying | expected
         if obeying.all() and not (silent | down).any():
             return state
         when = f"{self._mission_s(state):.1f} s into the mission"
@@ -305,6 +379,15 @@ class Flight:
             return 0.0
         run_up_s = self.scenario.mission.run_up_s
         return mission.run_up(self.scenario.mission.cruise_m_s, run_up_s, ticks * self._period_s)[0]
+
+
+def _by_tick(scenario: Scenario, ratings: Iterable[Rating]) -> dict[int, tuple[Rating, ...]]:
+    """Ratings by the tick of the mission at which they count: the first at or after their time."""
+    due: dict[int, tuple[Rating, ...]] = {}
+    for rating in ratings:
+        tick = scenario.time.ticks(max(0.0, rating.time_s or 0.0))
+        due[tick] = (*due.get(tick, ()), rating)
+    return due
 
 
 def _fell_silent(swarm: Swarm, silent: npt.NDArray[np.bool_], phase: Phase) -> str:

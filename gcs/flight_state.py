@@ -8,7 +8,9 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
+from gcs.beliefs import Belief
 from gcs.commands import Command
+from gcs.events import Rating
 from gcs.swarm_frame import SwarmFrame
 from trustr.controller import Decision, Memory
 from trustr.leader import VirtualLeader
@@ -53,6 +55,8 @@ class FlightState:
     """(N) what each vehicle was last asked for, so that asking again can wait."""
     sent_ned: Array
     """(N, 3) m/s: the set-points sent last."""
+    belief: Belief
+    """Of each robot's health."""
     frame: SwarmFrame | None = None
     """None until every vehicle has told where it is."""
     shift_ne: Array | None = None
@@ -92,6 +96,10 @@ class Diagnosis:
     """(N,) of the gate."""
     commanded: npt.NDArray[np.bool_] | None = None
     """(N,) whom a set-point was sent to."""
+    belief: Belief | None = None
+    """What the trust was drawn from; None before the mission."""
+    ratings: tuple[Rating, ...] = ()
+    """What people said that counted at this tick."""
 
 
 def entered(state: FlightState, phase: Phase) -> FlightState:

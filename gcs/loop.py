@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Protocol
 
+from gcs.events import Event
 from gcs.flight import Flight
 from gcs.flight_state import Diagnosis, FlightState
 from gcs.messages import Encoder
@@ -52,8 +53,8 @@ class Tick:
     lateness_ns: int
     """After its deadline."""
     frames: list[Frame]
-    events: tuple[str, ...]
-    """What an operator asked for."""
+    events: tuple[Event, ...]
+    """What people said."""
     swarm: Swarm
     state: FlightState
     diagnosis: Diagnosis
@@ -74,9 +75,9 @@ def fly(
     record: Iterable[Record],
     *,
     period_ns: int,
-    events: Callable[[], tuple[str, ...]] = tuple,
+    events: Callable[[], tuple[Event, ...]] = tuple,
 ) -> FlightState:
-    """Fly one flight to its end. `events` hands out what an operator asked for since the last tick."""
+    """Fly one flight to its end. `events` hands out what people said since the last tick, and is asked once a tick."""
     recorders = tuple(record)
     encoders = {system: Encoder(system) for system in decide.ids}
     swarm, state = Swarm.of(decide.ids), decide.start()

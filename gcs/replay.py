@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gcs.events import Event
 from gcs.flight import Flight
 from gcs.loop import fly
 from gcs.recording.reader import RecordedTick, UnreadableRecording, located, read, ticks
@@ -51,8 +52,8 @@ class Recorded:
         """Nothing: only good frames are recorded."""
         return 0
 
-    def events(self) -> tuple[str, ...]:
-        """What the operator asked for at this tick."""
+    def events(self) -> tuple[Event, ...]:
+        """What people said at this tick."""
         return self._pages[self._page].events
 
 
@@ -77,7 +78,8 @@ class Verification:
 def decide_again(path: Path) -> Verification:
     """Decide a recording, or the one in a run's folder, again, bit for bit. Raises UnreadableRecording."""
     path = located(path)
-    flight = Flight(read(path).scenario)
+    told = read(path)
+    flight = Flight(told.scenario, ratings=() if told.rated else None)
     pages = list(ticks(path))
     if not pages:
         raise UnreadableRecording(f"{path}: holds no tick to decide again")

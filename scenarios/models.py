@@ -186,13 +186,21 @@ class Trust(Section):
     """Where trust comes from."""
 
     source: Literal["truth", "ratings", "auto", "fused"] = "truth"
-    """The simulation's own knowledge of the fault; what people say (without anyone to say it, the study's mean ratings);
-    what the swarm's own behaviour shows; or both together."""
+    """The simulation's own knowledge of the fault; what people say (without anyone to say it, the study's mean
+    ratings); what the swarm's own behaviour shows; or both together."""
     faulty_rating: Likert = 1.94
     """Mean rating of the failed robot in the user study, 1 to 5."""
     others_rating: Likert = 3.83
     """Mean rating of the repaired swarm in the user study, 1 to 5."""
 
+    response_delay_s: Annotated[float, Field(ge=0, le=3)] = 0.147
+    """How healthy vehicles answer a velocity set-point: not at all for so long …"""
+    response_lag_s: Annotated[float, Field(ge=0, le=3)] = 0.298
+    """… then as a first-order lag. `gcs identify` finds both, and the two tolerances, from fault-free flights."""
+    tolerance_m_s: Positive = 0.05
+    """σ_h: how far a healthy vehicle's velocity strays from that answer, an axis."""
+    place_tolerance_m: Positive = 0.1
+    """How far a healthy vehicle's position strays, in a second, from where its reported velocity takes it, an axis."""
     age_out_s: Positive = 20.0
     """Time in which a rating's say falls to 1/e."""
     hand_over: bool = True

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from trustr.consensus import Heard, Rule, weighted_mean
 from trustr.leader import VirtualLeader, navigational_feedback
 from trustr.network import Array, Graph, neighbours
+from trustr.roles import Roles, closed_up, hand_over, leave_behind
 from trustr.separation import separation
 
 
@@ -22,8 +23,14 @@ class Settings:
     """One of `consensus.RULES`, or a researcher's own."""
     offset_ne: Array
     """(N, 2) m, each robot's place in the formation."""
+    files: tuple[npt.NDArray[np.intp], ...]
+    """Indices of the robots of each file of the formation, front to rear."""
     leaders: npt.NDArray[np.intp]
-    """(L,) indices of the robots that hear the virtual leader."""
+    """(L,) indices of the robots that hear the virtual leader, to begin with."""
+    hand_over: bool
+    """Distrusted leaders pass their role on."""
+    leave_behind: bool
+    """Robots beyond repair are left behind."""
     c1: float
     """1/s."""
     c2: float
@@ -47,6 +54,10 @@ class Settings:
     eta: float
     threshold: float
     """Trust below which a sender's η is `eta`."""
+    confidence: float
+    """c of λ_t = c e^(−γt), the rule `confidence-decay`."""
+    confidence_decay: float
+    """1/s: γ of the same."""
     separation_radius: float
     """m."""
     separation_gain: float
@@ -54,10 +65,6 @@ class Settings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-    confidence: float
-    """c of λ_t = c e^(−γt), the rule `confidence-decay`."""
-    confidence_decay: float
-    """1/s: γ of the same."""
 class Observation:
     """What a tick knows: measured, in the swarm's NED frame, horizontal."""
 
@@ -83,8 +90,7 @@ class Memory:
     """(N, 2) m/s: the velocities of the mission's first tick."""
     standing: Array
     """(N,) s: ∫ (trust − ½) dt."""
-    leaders: npt.NDArray[np.intp]
-    """(L,) who has the leaders' role."""
+    roles: Roles
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,8 +100,11 @@ class Decision:
     velocity_ne: Array
     """(N, 2) m/s; zero for robots that are not heard."""
     graph: Graph
+    """Who heeds whom: robots that were left behind speak to nobody."""
     weights: Array
     """(E,) one for each edge of the graph."""
+    roles: Roles
+    """Who led, and who was left behind."""
 
 
 def decide(
@@ -104,27 +113,32 @@ def decide(
     """Eq. 11 and 12 (or another rule than eq. 12) for all robots at once, separation added.
 
     memory: what the tick before returned; None at the first.
-    A robot that is not heard has weight exactly 0 with every other, and is commanded to stand still.
+    A robot that is not heard has weight exactly 0 with every other, and is commanded to stand still. One that was left
+    behind has weight 0 too; it is told to go along with the others, who keep their distance from it, and whoever flies
+    it takes it out of their way.
     """
     heard = (
         observation.heard & np.isfinite(observation.position_ne).all(1) & np.isfinite(observation.velocity_ne).all(1)
     )
     position, velocity = _of_the_heard(observation.position_ne, heard), _of_the_heard(observation.velocity_ne, heard)
-    graph = neighbours(position, heard, range_m=settings.range_m)
-    memory = _remembered(memory, observation, velocity, settings)
+    memory = _remembered(memory, observation, velocity, heard, settings)
+    roles, left = memory.roles, memory.roles.left
+    around = neighbours(position, heard, range_m=settings.range_m)
+    graph = around.without(left)
     agreement = settings.rule(
         Heard(graph, velocity, observation.trust, observation.time_s, memory.first_ne, memory.standing), settings
     )
     weights, consensus = agreement.weights, agreement.velocity_ne
     command = consensus.copy()
-    leaders, place = memory.leaders, position - settings.offset_ne
+    leaders = roles.leaders[~left[roles.leaders]]
+    place = position - closed_up(settings.offset_ne, settings.files, left)
     if settings.swarm_feedback:
         # Followers know no path: whatever the leaders' feedback sums up to shears the formation and stays, and the mean
         # is off by it. So leaders answer for the mean, and the formation closes up (docs/recommended-profile.md).
         swarm_place = weighted_mean(graph, weights, place)
-        trusted = np.count_nonzero(heard & (observation.trust >= settings.threshold))
+        trusted = np.count_nonzero(heard & ~left & (observation.trust >= settings.threshold))
         followers_a_leader = trusted / max(1, int(np.count_nonzero(heard[leaders])))
-        command -= settings.formation_gain * (place - swarm_place)
+        command -= settings.formation_gain * np.where(left[:, None], 0.0, place - swarm_place)
         command[leaders] += navigational_feedback(
             swarm_place[leaders],
             consensus[leaders],
@@ -143,17 +157,27 @@ def decide(
             c2=settings.c2,
             cap=settings.feedback_cap,
         )
-    command += separation(graph, position, radius=settings.separation_radius, gain=settings.separation_gain)
-    return memory, Decision(_of_the_heard(command, heard), graph, weights)
+    command += separation(around, position, radius=settings.separation_radius, gain=settings.separation_gain)
+    return memory, Decision(_of_the_heard(command, heard), graph, weights, roles)
 
 
-def _remembered(memory: Memory | None, observation: Observation, velocity: Array, settings: Settings) -> Memory:
+def _remembered(
+    memory: Memory | None,
+    observation: Observation,
+    velocity: Array,
+    heard: npt.NDArray[np.bool_],
+    settings: Settings,
+) -> Memory:
     """The memory this tick decides with, and leaves."""
+    trust, now = observation.trust, observation.time_s
     if memory is None:
-        return Memory(observation.time_s, velocity, np.zeros(len(velocity)), settings.leaders)
-    dt = observation.time_s - memory.time_s
-    standing = memory.standing + (observation.trust - 0.5) * dt
-    return Memory(observation.time_s, memory.first_ne, standing, memory.leaders)
+        memory = Memory(now, velocity, np.zeros(len(velocity)), Roles.of(len(velocity), settings.leaders))
+    roles, dt = memory.roles, now - memory.time_s
+    if settings.leave_behind:
+        roles = leave_behind(roles, trust=trust, dt=dt)
+    if settings.hand_over:
+        roles = hand_over(roles, trust=trust, heard=heard, offset_ne=settings.offset_ne)
+    return Memory(now, memory.first_ne, memory.standing + (trust - 0.5) * dt, roles)
 
 
 def _of_the_heard(vectors: Array, heard: npt.NDArray[np.bool_]) -> Array:

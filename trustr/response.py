@@ -76,17 +76,11 @@ def identify(samples: list[Sample], *, dt: float) -> Response:
     def errors(parameters: Array) -> Array:
         response = Response(*map(float, parameters))
         return np.concatenate(
-            [
-                (s.velocity_ne - followed(response, s.velocity_ne[0], s.commanded_ne, dt=dt)).ravel()
-                for s in samples
-            ]
+            [(s.velocity_ne - followed(response, s.velocity_ne[0], s.commanded_ne, dt=dt)).ravel() for s in samples]
         )
 
     best = min(
-        (
-            least_squares(errors, start, bounds=(0.0, LONGEST_S), diff_step=1e-3)
-            for start in ((0.15, 0.3), (0.4, 1.0))
-        ),
+        (least_squares(errors, start, bounds=(0.0, LONGEST_S), diff_step=1e-3) for start in ((0.15, 0.3), (0.4, 1.0))),
         key=lambda fit: fit.cost,
     )
     return Response(*map(float, best.x))

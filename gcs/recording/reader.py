@@ -16,6 +16,7 @@ from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader, SeekingReader
 from pydantic import ValidationError
 
+from gcs.events import Event, Rating
 from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
 from gcs.mission import plan
 from gcs.recording.writer import METADATA, SCENARIO, SUMMARY
@@ -40,6 +41,8 @@ class Flown:
 
     path: Path
     scenario: Scenario
+    rated: bool
+    """Whether people could say something, beforehand or while it was flown."""
     problem: str | None
     """Why the flight could not be completed, if it told."""
     track: Track | None
@@ -51,7 +54,7 @@ class RecordedTick(NamedTuple):
     time_ns: int
     received: list[Frame]
     sent: list[bytes]
-    events: tuple[str, ...]
+    events: tuple[Event, ...]
 
 
 def located(path: Path) -> Path:
@@ -70,7 +73,8 @@ def read(path: Path) -> Flown:
         loaded = Scenario.model_validate_json(scenario)
         points = list(_points(reader))
         problem = orjson.loads(metadata[SUMMARY]["json"])["problem"] if SUMMARY in metadata else CUT_SHORT
-    return Flown(path, loaded, problem, Track.of(points, read_out_s=plan(loaded).read_out_s))
+    rated = metadata[METADATA].get("ratings", "") != ""
+    return Flown(path, loaded, rated, problem, Track.of(points, read_out_s=plan(loaded).read_out_s))
 
 
 @contextmanager
@@ -118,7 +122,7 @@ def _upwards(position_ned: list[list[float | None]]) -> npt.NDArray[np.float64]:
 
 def ticks(path: Path) -> Iterator[RecordedTick]:
     """The frames of a recording as the loop took and sent them, in the file's order. Raises UnreadableRecording."""
-    framer, received, sent = Framer(), list[Frame](), list[bytes]()
+    framer, received, sent, said = Framer(), list[Frame](), list[bytes](), list[Rating]()
     own = f"/mavlink/{GROUND_SYSTEM}_{GROUND_COMPONENT}/raw"
     with _readable(path), path.open("rb") as stream:
         reader = NonSeekingReader(stream, validate_crcs=True, record_size_limit=RECORD_SIZE_LIMIT)
@@ -127,7 +131,11 @@ def ticks(path: Path) -> Iterator[RecordedTick]:
                 sent.append(message.data)
             elif channel.message_encoding == "mavlink":
                 received += framer.frames(message.log_time, message.data)
+            elif channel.topic == "/ratings":
+                content = orjson.loads(message.data)
+                whom = content["vehicle"]
+                said.append(Rating(content["rater"], None if whom == "swarm" else whom, content["rating"]))
             elif channel.topic == "/tick":
                 content = orjson.loads(message.data)
-                yield RecordedTick(message.log_time, received, sent, tuple(content["events"]))
-                received, sent = [], []
+                yield RecordedTick(message.log_time, received, sent, (*content["events"], *said))
+                received, sent, said = [], [], []

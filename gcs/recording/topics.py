@@ -57,6 +57,52 @@ class TrustTopic:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class EvidenceTopic:
+    """/evidence: what trust was drawn from; log odds are of being faulty, positive speaks against a vehicle."""
+
+    tick: int
+    mission_s: float
+    log_odds: Vector
+    """From behaviour."""
+    spoken: Vector
+    """Log odds from ratings."""
+    response_m_s: Vector
+    """Velocity off what a healthy vehicle would make of its set-points, smoothed."""
+    inconsistency_m: Vector
+    """Position off where the vehicle's own velocities take it, smoothed."""
+    disagreement_m_s: Vector
+    """Velocity off the median of its trusted neighbours, smoothed."""
+    velocity_noise_m_s: float
+    """Standard deviation of telemetry's white noise, an axis, as estimated."""
+    position_noise_m: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RatingTopic:
+    """/ratings: what a person said, at the tick at which it counted, and what was believed then."""
+
+    tick: int
+    time_s: float
+    """Since mission start; null before."""
+    rater: str
+    vehicle: int | str
+    """System id, or "swarm"."""
+    rating: int
+    trust: Vector
+    """Of all vehicles, with this rating counted."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RolesTopic:
+    """/roles: who leads, and who was left behind, whenever it changes."""
+
+    tick: int
+    mission_s: float
+    leaders: list[int]
+    left_behind: list[int]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class WeightsTopic:
     """/weights: row i is how much robot i heeds each robot, eq. 17; rows sum to 1."""
 
@@ -137,6 +183,8 @@ JSON_TYPES: dict[str, dict[str, Any]] = {
     "float": NUMBER,
     "str": {"type": "string"},
     "bool": {"type": "boolean"},
+    "int | str": {"type": ["integer", "string"]},
+    "list[int]": {"type": "array", "items": {"type": "integer"}},
     "list[str]": {"type": "array", "items": {"type": "string"}},
     "dict[str, Any]": {"type": "object"},
     "Vector": {"type": "array", "items": {"type": ["number", "boolean", "null"]}},

@@ -12,11 +12,13 @@ import numpy as np
 import orjson
 from mcap.writer import CompressionType, Writer
 
+from gcs.beliefs import Belief
 from gcs.loop import Clock, Link, Tick
 from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
 from gcs.recording import topics
 from gcs.truth import Truth
 from scenarios import Fault, Scenario
+from trustr.roles import Roles
 from wire.frames import Frame
 
 FLUSH_NS = 80_000_000
@@ -55,6 +57,7 @@ class Recorder:
         self._faults = scenario.fault
         self._active = [False] * len(scenario.fault)
         self._flushed_ns = start_ns
+        self._roles: tuple[list[int], list[int]] | None = None
 
     def __enter__(self) -> Recorder:
         return self
@@ -115,7 +118,12 @@ class Recorder:
             position = self._truth.position(tick.state.frame, tick.swarm)
             pose = topics.PoseTopic(number, diagnosis.mission_s, position, self._truth.velocity_ned)
             self._write(time_ns, "/truth/pose", pose)
-        turn = topics.TickTopic(number, len(tick.frames), tick.lateness_ns, diagnosis.phase.value, list(tick.events))
+        for rating in diagnosis.ratings:
+            whom = "swarm" if rating.vehicle is None else rating.vehicle
+            said = topics.RatingTopic(number, diagnosis.mission_s, rating.rater, whom, rating.rating, diagnosis.trust)
+            self._write(time_ns, "/ratings", said)
+        words = [event for event in tick.events if isinstance(event, str)]
+        turn = topics.TickTopic(number, len(tick.frames), tick.lateness_ns, diagnosis.phase.value, words)
         self._write(time_ns, "/tick", turn)
         if time_ns - self._flushed_ns >= FLUSH_NS:
             self._writer.flush()  # type: ignore[no-untyped-call]
@@ -133,10 +141,20 @@ class Recorder:
         if diagnosis.decision is not None:
             weights = diagnosis.decision.graph.dense(diagnosis.decision.weights)
             self._write(time_ns, "/weights", topics.WeightsTopic(number, mission_s, weights))
+            self._told_roles(tick, diagnosis.decision.roles)
+        if diagnosis.belief is not None and diagnosis.belief.evidence is not None:
+            self._write(time_ns, "/evidence", _evidence_topic(number, mission_s, diagnosis.belief))
         for index, fault in enumerate(self._faults):
             if fault.active(mission_s) != self._active[index]:
                 self._active[index] = not self._active[index]
                 self._write(time_ns, "/truth/fault", _fault_topic(fault, mission_s))
+
+    def _told_roles(self, tick: Tick, roles: Roles) -> None:
+        ids = tick.swarm.ids
+        told = [ids[row] for row in roles.leaders], [ids[row] for row in np.flatnonzero(roles.left)]
+        if told != self._roles:
+            self._roles = told
+            self._write(tick.time_ns, "/roles", topics.RolesTopic(tick.number, tick.diagnosis.mission_s, *told))
 
     def _fleet(self, tick: Tick) -> None:
         swarm = tick.swarm
@@ -196,6 +214,22 @@ class Tap:
     def rejected(self) -> int:
         """What the link refused."""
         return self._link.rejected
+
+
+def _evidence_topic(number: int, mission_s: float, belief: Belief) -> topics.EvidenceTopic:
+    evidence = belief.evidence
+    assert evidence is not None
+    return topics.EvidenceTopic(
+        tick=number,
+        mission_s=mission_s,
+        log_odds=evidence.log_odds,
+        spoken=belief.spoken,
+        response_m_s=np.hypot(*evidence.residual_ne.T),
+        inconsistency_m=np.hypot(*evidence.inconsistency_ne.T),
+        disagreement_m_s=np.hypot(*evidence.disagreement_ne.T),
+        velocity_noise_m_s=evidence.velocity_noise**0.5,
+        position_noise_m=evidence.place_noise**0.5,
+    )
 
 
 def _fault_topic(fault: Fault, mission_s: float) -> topics.FaultTopic:
