@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import common as dialect
 from fdm import modes
 from fdm.modes import Failsafe, Mode, Outcome, Pilot, Setpoint, Situation
 from fdm.personality import PX4, Personality
+from fdm.sensors import SAMPLE_S
 from fdm.streams import NEVER, Schedule
 from fdm.surroundings import PERIOD_S, Surroundings
 from fdm.telemetry import Reporter
@@ -19,8 +20,9 @@ from wire.frames import Frame, Framer, decode
 from wire.ids import AUTOPILOT
 from wire.payloads import SET_POSITION_TARGET_LOCAL_NED, PositionTarget, unpack_position_target
 
-GUIDANCE, WATCHDOG, TRUTH = -3, -2, -1
-"""Keys of the schedule that are no message ids: flying, the end of patience with silent set-points, the truth."""
+SAMPLING, GUIDANCE, WATCHDOG, TRUTH = -4, -3, -2, -1
+"""Keys of the schedule that are no message ids, in the order in which they are served: noting what stale telemetry
+will tell, flying, the end of patience with silent set-points, the truth."""
 TRUTH_PERIOD_S = 0.1
 
 VELOCITY_MASKS = frozenset({0x0DC7, 0x09C7, 0x05C7, 0x0FC7})
@@ -76,6 +78,8 @@ class Endpoint:
         self._schedule = Schedule(physics_hz)
         self._schedule.set_interval(GUIDANCE, PERIOD_S, step=0)
         self._schedule.set_interval(TRUTH, TRUTH_PERIOD_S, step=0)
+        if surroundings.sensors.go_stale:
+            self._schedule.set_interval(SAMPLING, SAMPLE_S, step=0)
         for message, rate_hz in personality.streams_hz.items():
             self._schedule.set_interval(message, 1.0 / rate_hz, step=0)
         self._pilot = Pilot()
@@ -166,6 +170,8 @@ class Endpoint:
                 self._surroundings.renew(self.vehicle, now.time_s)
                 self._take(modes.advance(self._pilot, now, self._failsafe), now)
                 self._fly(now, dt=PERIOD_S)
+            elif key == SAMPLING:
+                self._surroundings.sensors.note((*now.position_ned, *now.velocity_ned), now.time_s)
             elif key == WATCHDOG:
                 self._watch(now)
             elif key == TRUTH:
@@ -175,7 +181,7 @@ class Endpoint:
 
     def _report(self, message: int, now: Situation) -> None:
         if message in MEASUREMENTS and self._measured_step != self.vehicle.steps:
-            self._measured = self._surroundings.measured((*now.position_ned, *now.velocity_ned), now.time_s)
+            self._measured = self._surroundings.sensors.measured((*now.position_ned, *now.velocity_ned), now.time_s)
             self._measured_step = self.vehicle.steps
         self._send(self._reporter.report(message, self._pilot, now, self._measured))
 

@@ -21,6 +21,7 @@ class Purpose(IntEnum):
     MEASUREMENT = 1
     GUST = 2
     TURBULENCE = 3
+    FAULT_GUST = 4
 
 
 def generator(seed: int, vehicle: int, purpose: Purpose) -> np.random.Generator:
@@ -48,3 +49,22 @@ def gusts(
     for draw_n, draw_e in white(rng, (fresh, fresh)):
         yield north, east
         north, east = keep * north + draw_n, keep * east + draw_e
+
+
+class Held:
+    """A stream by time: each draw lasts so long, whoever asks and however often, at times that never fall.
+
+    The n-th is valid until n periods after time 0, the first before that too.
+    """
+
+    def __init__(self, stream: Iterator[tuple[float, ...]], *, period_s: float) -> None:
+        self._stream, self._period_s = stream, period_s
+        self._draw = next(stream)
+        self._draws = 1
+
+    def at(self, time_s: float) -> tuple[float, ...]:
+        """The draw that is valid then."""
+        due = math.ceil(time_s / self._period_s - 1e-6)
+        while self._draws < due:
+            self._draw, self._draws = next(self._stream), self._draws + 1
+        return self._draw

@@ -3,9 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 from gcs.summary import Summary
-from scenarios import Fault, MotorDegradation, Scenario
+from scenarios import (
+    CompassBias,
+    FalseReport,
+    Fault,
+    FrozenTelemetry,
+    GpsDrift,
+    GpsJump,
+    LaggingTelemetry,
+    MotorDegradation,
+    RotorFault,
+    Scenario,
+    StuckVelocity,
+    WindFault,
+)
 
 
 def faults(scenario: Scenario) -> list[str]:
@@ -14,9 +28,50 @@ def faults(scenario: Scenario) -> list[str]:
 
 
 def _fault(fault: Fault) -> str:
-    if isinstance(fault, MotorDegradation):
-        return f"robot {fault.vehicle} at {fault.max_speed_fraction:.0%} speed"
-    return f"a broken rotor on robot {fault.vehicle}"
+    when = ", ".join(_when(fault))
+    return f"{_what(fault)} ({when})" if when else _what(fault)
+
+
+def _what(fault: Fault) -> str:
+    robot = f"robot {fault.vehicle}"
+    match fault:
+        case MotorDegradation():
+            return f"{robot} at {fault.max_speed_fraction:.0%} speed"
+        case RotorFault():
+            left = (f"{fault.efficiency:.0%} thrust", f"{fault.speed_limit:.0%} speed")
+            worse = left[fault.speed_limit < fault.efficiency]
+            return f"a rotor of {robot} at {worse}" if fault.efficiency else f"a broken rotor on {robot}"
+        case CompassBias():
+            return f"the compass of {robot} off by {fault.bias_deg:g}°"
+        case StuckVelocity():
+            return f"{robot} stuck with its set-point"
+        case WindFault():
+            gusts = f" and gusts of {fault.gust_m_s:g} m/s" if fault.gust_m_s else ""
+            return f"wind of {fault.speed_m_s:g} m/s{gusts} on {'everyone' if fault.everyone else robot}"
+        case GpsDrift():
+            return f"the GPS of {robot} drifting by {fault.rate_m_s:g} m/s"
+        case GpsJump():
+            return f"the GPS of {robot} off by {fault.distance_m:g} m"
+        case FalseReport():
+            return f"{robot} lying about its velocity by {fault.offset_m_s:g} m/s"
+        case LaggingTelemetry():
+            return f"telemetry of {robot} late by {fault.lag_s:g} s"
+        case FrozenTelemetry():
+            return f"telemetry of {robot} frozen"
+    raise TypeError(f"a fault without words: {fault!r}")
+
+
+def _when(fault: Fault) -> Iterator[str]:
+    if fault.grows_over_s:
+        yield f"growing over {fault.grows_over_s:g} s"
+    if fault.period_s is not None and fault.on_fraction < 1.0:
+        yield f"on for {fault.on_fraction:.0%} of every {fault.period_s:g} s"
+    if fault.onset_s and fault.end_s is not None:
+        yield f"from {fault.onset_s:g} s to {fault.end_s:g} s"
+    elif fault.onset_s:
+        yield f"from {fault.onset_s:g} s on"
+    elif fault.end_s is not None:
+        yield f"until {fault.end_s:g} s"
 
 
 def verdict(summary: Summary) -> str:

@@ -24,8 +24,9 @@ def offsets_ne(scenario: Scenario) -> npt.NDArray[np.float64]:
 
 
 def healthy_robots(scenario: Scenario) -> npt.NDArray[np.bool_]:
-    """(N,) robots that no fault ever strikes."""
+    """(N,) robots that no fault is ever blamed on."""
     healthy = np.ones(scenario.swarm.count, bool)
     for fault in scenario.fault:
-        healthy[fault.vehicle - 1] = False
+        if fault.blamed is not None:
+            healthy[fault.blamed - 1] = False
     return healthy

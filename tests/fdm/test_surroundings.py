@@ -66,7 +66,7 @@ def test_wind_and_turbulence_strike_only_the_vehicles_that_are_named():
 def test_before_mission_start_the_air_is_steady_and_sensors_are_exact():
     surroundings, vane = settled(scenario(noise=NOISE))
     assert renew(surroundings, vane, 0.0, 5.0) == []
-    assert surroundings.measured(TRUTH, 5.0) == TRUTH
+    assert surroundings.sensors.measured(TRUTH, 5.0) == TRUTH
 
 
 def test_gusts_come_on_top_of_the_wind_every_period_from_mission_start():
@@ -85,7 +85,7 @@ def test_measurements_are_blurred_sideways_and_never_vertically():
     surroundings, vane = settled(scenario(noise=NOISE))
     surroundings.begin(vane, 10.0)
     n = 10_000
-    errors = np.array([surroundings.measured(TRUTH, 10.0 + k) for k in range(n)]) - TRUTH
+    errors = np.array([surroundings.sensors.measured(TRUTH, 10.0 + k) for k in range(n)]) - TRUTH
     assert not errors[:, [2, 5]].any()
     for axis, sigma in ((0, 0.1), (1, 0.1), (3, 0.05), (4, 0.05)):
         assert errors[:, axis].std() == pytest.approx(sigma, rel=5 / math.sqrt(2 * n))
@@ -98,7 +98,7 @@ def test_the_same_seed_meets_the_same_air_however_late_the_mission_begins():
         surroundings, vane = settled(told, seed=seed, vehicle=vehicle)
         surroundings.begin(vane, start_s)
         winds = renew(surroundings, vane, start_s, 15.0)
-        return winds, [surroundings.measured(TRUTH, start_s + k) for k in range(300)]
+        return winds, [surroundings.sensors.measured(TRUTH, start_s + k) for k in range(300)]
 
     assert weather(10.0) == weather(73.25)
     assert weather(10.0)[0] != weather(10.0, seed=2)[0]
@@ -113,13 +113,13 @@ def test_the_next_mission_begins_as_the_first_did():
 
     def mission(start_s):
         surroundings.begin(vane, start_s)
-        return renew(surroundings, vane, start_s, 5.0), surroundings.measured(TRUTH, start_s)
+        return renew(surroundings, vane, start_s, 5.0), surroundings.sensors.measured(TRUTH, start_s)
 
     first = mission(10.0)
     surroundings.end(vane)
     assert vane.winds[-1] == steady
     assert vane.rotors[-1] == (1, 1.0, 1.0)
-    assert surroundings.measured(TRUTH, 16.0) == TRUTH
+    assert surroundings.sensors.measured(TRUTH, 16.0) == TRUTH
     assert renew(surroundings, vane, 16.0, 5.0) == []
     assert mission(50.0) == first
     assert vane.turbulence == [8.0, 0.0, 8.0]
