@@ -1,4 +1,4 @@
-"""What a person does while a flight goes on, as events of the loop: for now, to end it."""
+"""What people do while a flight goes on, as events of the loop: to end it, and to rate who flies it."""
 
 from __future__ import annotations
 
@@ -6,15 +6,19 @@ import signal
 from collections.abc import Callable
 from types import FrameType, TracebackType
 
+from gcs.events import LAND, Event, Rating
+
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Ctrl-C, a polite kill, a terminal that is closed."""
 
 
 class Operator:
-    """Turns the first signal into the event "land"; the second ends the process at once, its recording closed."""
+    """Turns the first signal into the event LAND; the second ends the process at once, its recording closed."""
 
-    def __init__(self, say: Callable[[str], None]) -> None:
+    def __init__(self, say: Callable[[str], None], *, ratings: Callable[[], tuple[Rating, ...]] = tuple) -> None:
+        """ratings: hands out those that came since its last call; called once by each call of `events`."""
         self._say = say
+        self._ratings = ratings
         self._waiting: list[str] = []
         self.interrupted = False
 
@@ -28,15 +32,15 @@ class Operator:
         for number, handler in self._before.items():
             signal.signal(number, handler)
 
-    def events(self) -> tuple[str, ...]:
-        """What was asked for since the last call; what is to be said of it is said here, outside the signal."""
+    def events(self) -> tuple[Event, ...]:
+        """What came since the last call; what is to be said of it is said here, outside the signal."""
         asked, self._waiting = tuple(self._waiting), []
         if asked:
             self._say("Landing the swarm. Ctrl-C once more ends at once and lands nothing.")
-        return asked
+        return *asked, *self._ratings()
 
     def _on_signal(self, _signal: int, _frame: FrameType | None) -> None:
         if self.interrupted:
             raise KeyboardInterrupt
         self.interrupted = True
-        self._waiting.append("land")
+        self._waiting.append(LAND)
