@@ -50,7 +50,11 @@ class Choices:
     """What a flight is to be, besides its scenario."""
 
     controller: Annotated[
-        Literal["average", "trust-r"] | None, Parameter(help="Update rule; the scenario's own, if absent.")
+        str | None,
+        Parameter(
+            help="Update rule: average, trust-r, median, wmsr-1, wmsr-2, confidence-decay, or your own as "
+            "package.module:function; the scenario's, if absent."
+        ),
     ] = None
     trust: Annotated[Literal["truth", "ratings"] | None, Parameter(help="Where trust comes from.")] = None
     severity: Annotated[
@@ -68,7 +72,8 @@ class Choices:
     ] = ()
 
     def scenario(self, name: str) -> Scenario:
-        """The scenario as chosen. Raises ScenarioError and BadUsageError."""
+        """The scenario as chosen. Raises ScenarioError, RuleError and BadUsageError."""
+        from gcs.control import settings
         from scenarios import MotorDegradation, load
 
         overrides = list(self.set_)
@@ -77,6 +82,7 @@ class Choices:
         if self.trust is not None:
             overrides.append(f'trust.source="{self.trust}"')
         loaded = load(name, overrides=overrides)
+        settings(loaded)  # tries its rule, which may be anybody's, before anything is made or flown
         if self.no_fault:
             loaded = loaded.without_faults()
         if self.severity is None:
@@ -322,10 +328,19 @@ def _refusals() -> tuple[type[Exception], ...]:
     from gcs.compare import UnwritablePicture
     from gcs.recording.reader import UnreadableRecording
     from gcs.recording.writer import RecordingError
+    from gcs.rules import RuleError
     from scenarios import ScenarioError
     from wire.connection import ConnectionRefused
 
-    return BadUsageError, ScenarioError, ConnectionRefused, RecordingError, UnreadableRecording, UnwritablePicture
+    return (
+        BadUsageError,
+        ScenarioError,
+        RuleError,
+        ConnectionRefused,
+        RecordingError,
+        UnreadableRecording,
+        UnwritablePicture,
+    )
 
 
 def _write(line: bytes) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from gcs.rules import rehearse, rule
 from scenarios import Scenario, offsets_ne
-from trustr.consensus import RULES
 from trustr.controller import Settings
 
 REFERENCE_RESPONSE_S = 0.25
@@ -19,13 +19,13 @@ HEEDLESS = ("average", "median", "wmsr-1", "wmsr-2", "confidence-decay")
 
 
 def settings(scenario: Scenario) -> Settings:
-    """What the controller of this scenario's flight is bound to."""
+    """What the controller of this scenario's flight is bound to. Raises RuleError where its rule cannot be flown."""
     control, network, cruise = scenario.control, scenario.network, scenario.mission.cruise_m_s
     swarm = scenario.swarm
     recommended = control.profile == "recommended"
     slower = control.response_time_s / REFERENCE_RESPONSE_S if recommended else 1.0
-    return Settings(
-        rule=RULES[control.rule],
+    chosen = Settings(
+        rule=rule(control.rule),
         offset_ne=offsets_ne(scenario),
         files=tuple(np.arange(swarm.count).reshape(swarm.rows, swarm.columns).T),
         leaders=np.array(swarm.leaders) - 1,
@@ -48,3 +48,5 @@ def settings(scenario: Scenario) -> Settings:
         separation_radius=control.separation_radius_m,
         separation_gain=control.separation_gain,
     )
+    rehearse(chosen)
+    return chosen

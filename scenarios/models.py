@@ -152,7 +152,7 @@ class Control(Section):
     @field_validator("rule")
     @classmethod
     def _known(cls, rule: str) -> str:
-        if rule not in RULES and not re.fullmatch(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*", rule):
+        if rule not in RULES and not re.fullmatch(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*", rule):
             raise ValueError(f"rule = {rule!r}: allowed are {', '.join(RULES)}, or package.module:function")
         return rule
 
@@ -235,6 +235,20 @@ class Wind(Section):
     """System ids it acts on; all, if absent."""
 
 
+class Vehicle(Section):
+    """How a slower autopilot takes up horizontal set-points in OFFBOARD, on top of the flight model's own response.
+
+    None of it acts unless a key is set.
+    """
+
+    lag_s: Annotated[float, Field(ge=0, le=10)] = 0.0
+    """Time constant with which it approaches a set-point, as far as the two bounds allow."""
+    acceleration_m_s2: Positive | None = None
+    """The most it speeds up or brakes; no bound of its own, if absent."""
+    jerk_m_s3: Positive | None = None
+    """The most that its acceleration changes a second; no bound of its own, if absent."""
+
+
 class Limits(Section):
     """What a set-point may ask for at most."""
 
@@ -264,6 +278,7 @@ class Scenario(Section):
     trust: Trust = Trust()
     noise: Noise = Noise()
     wind: Wind = Wind()
+    vehicle: Vehicle = Vehicle()
     limits: Limits = Limits()
     expect: Expect = Expect()
 

@@ -135,7 +135,7 @@ REFUSED = [
     (["nosuch"], "nosuch"),
     (["run", "nosuch"], "demo, emergency, transit"),
     (["run", "emergency", "trust-r"], "trust-r"),
-    (["run", "emergency", "--controller", "guess"], '"average", "trust-r"'),
+    (["run", "emergency", "--controller", "guess"], "rule = 'guess': allowed are average, trust-r, median"),
     (["run", "emergency", "--severity", "1.5"], "--severity 1.5: must be 0 to 1"),
     (["run", "emergency", "--severity", "nan"], "--severity nan"),
     (["run", "emergency", "--severity", "half"], '"half"'),
