@@ -30,6 +30,7 @@ from gcs.flight_state import (
     failed,
 )
 from gcs.gate import Limits, admit
+from gcs.rules import RuleError
 from gcs.swarm_frame import swarm_frame
 from gcs.telemetry import Swarm
 from scenarios import Scenario, offsets_ne
@@ -231,7 +232,10 @@ class Flight:
         heard = flying & swarm.fresh(now_ns, within_ns=STALE_NS)
         observation = Observation(diagnosis.position_ne, swarm.velocity_ned[:, :2], heard, diagnosis.trust, time_s)
         assert diagnosis.virtual is not None
-        memory, decision = decide(state.memory, observation, diagnosis.virtual, self._settings)
+        try:
+            memory, decision = decide(state.memory, observation, diagnosis.virtual, self._settings)
+        except RuleError as error:  # a researcher's own; who flies it is in the air
+            return self._land(failed(abandoned(state), str(error), Phase.LAND), swarm, now_ns)
         state = replace(state, memory=memory)
         commanded = flying & swarm.fresh(now_ns, within_ns=LOST_NS)
         if not decision.roles.left.any():
