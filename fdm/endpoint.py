@@ -12,17 +12,18 @@ from fdm import modes
 from fdm.modes import Failsafe, Mode, Outcome, Pilot, Setpoint, Situation
 from fdm.personality import PX4, Personality
 from fdm.sensors import SAMPLE_S
+from fdm.shaping import SHAPING_S, Level, Motion
 from fdm.streams import NEVER, Schedule
 from fdm.surroundings import PERIOD_S, Surroundings
 from fdm.telemetry import Reporter
-from fdm.vehicle import FlightModelDiverged, Geodetic, Vehicle
+from fdm.vehicle import FlightModelDiverged, Geodetic, Vector, Vehicle
 from wire.frames import Frame, Framer, decode
 from wire.ids import AUTOPILOT
 from wire.payloads import SET_POSITION_TARGET_LOCAL_NED, PositionTarget, unpack_position_target
 
-SAMPLING, GUIDANCE, WATCHDOG, TRUTH = -4, -3, -2, -1
+SAMPLING, SHAPING, GUIDANCE, WATCHDOG, TRUTH = -5, -4, -3, -2, -1
 """Keys of the schedule that are no message ids, in the order in which they are served: noting what stale telemetry
-will tell, flying, the end of patience with silent set-points, the truth."""
+will tell, taking up a velocity slowly, flying, the end of patience with silent set-points, the truth."""
 TRUTH_PERIOD_S = 0.1
 
 VELOCITY_MASKS = frozenset({0x0DC7, 0x09C7, 0x05C7, 0x0FC7})
@@ -59,6 +60,7 @@ class Endpoint:
         physics_hz: int,
         personality: Personality = PX4,
         failsafe: Failsafe = Failsafe(),  # noqa: B008 - frozen
+        shape: Callable[[Motion, Level], Motion] | None = None,
     ) -> None:
         self.vehicle = vehicle
         self.system = system
@@ -72,6 +74,10 @@ class Endpoint:
         self._surroundings = surroundings
         self._personality = personality
         self._failsafe = failsafe
+        self._shape = shape
+        self._motion: Motion | None = None
+        """What is asked of the flight controller, where set-points are shaped and flown."""
+        self._wanted_ned = (0.0, 0.0, 0.0)
         self._hz = physics_hz
         self._reporter = Reporter(vehicle, system=system, origin=origin, personality=personality)
         self._outbox: list[tuple[int, bytes]] = []
@@ -80,6 +86,8 @@ class Endpoint:
         self._schedule.set_interval(TRUTH, TRUTH_PERIOD_S, step=0)
         if surroundings.sensors.go_stale:
             self._schedule.set_interval(SAMPLING, SAMPLE_S, step=0)
+        if shape is not None:
+            self._schedule.set_interval(SHAPING, SHAPING_S, step=0)
         for message, rate_hz in personality.streams_hz.items():
             self._schedule.set_interval(message, 1.0 / rate_hz, step=0)
         self._pilot = Pilot()
@@ -172,6 +180,8 @@ class Endpoint:
                 self._fly(now, dt=PERIOD_S)
             elif key == SAMPLING:
                 self._surroundings.sensors.note((*now.position_ned, *now.velocity_ned), now.time_s)
+            elif key == SHAPING:
+                self._take_up()
             elif key == WATCHDOG:
                 self._watch(now)
             elif key == TRUTH:
@@ -201,11 +211,30 @@ class Endpoint:
         pilot = self._pilot
         velocity = modes.command(pilot, now)
         if pilot.mode is Mode.OFFBOARD:
-            velocity = self._surroundings.flown(velocity, now.time_s)
+            velocity = self._shaped(self._surroundings.flown(velocity, now.time_s), now)
+        else:
+            self._motion = None
         yaw = modes.heading(pilot, dt)
         if yaw != pilot.yaw:
             self._pilot = pilot._replace(yaw=yaw)
         self.vehicle.set_velocity(velocity, yaw)
+
+    def _shaped(self, velocity_ned: Vector, now: Situation) -> Vector:
+        """Where a slow vehicle is on its way to this velocity. OFFBOARD begins with the one it has."""
+        if self._shape is None:
+            return velocity_ned
+        self._wanted_ned = velocity_ned
+        if self._motion is None:
+            self._motion = Motion((now.velocity_ned[0], now.velocity_ned[1]))
+        return (*self._motion.velocity_ne, velocity_ned[2])
+
+    def _take_up(self) -> None:
+        """Every SHAPING_S: a little nearer to what is wanted."""
+        if self._shape is None or self._motion is None or self._pilot.mode is not Mode.OFFBOARD:
+            return
+        north, east, down = self._wanted_ned
+        self._motion = self._shape(self._motion, (north, east))
+        self.vehicle.set_velocity((*self._motion.velocity_ne, down), self._pilot.yaw)
 
     def _position_target(self, target: PositionTarget) -> None:
         if target.target_system not in (0, self.system) or target.target_component not in (0, AUTOPILOT):

@@ -9,6 +9,7 @@ import pymap3d
 
 from fdm.endpoint import Endpoint
 from fdm.noise import Purpose, generator
+from fdm.shaping import shape_of
 from fdm.surroundings import Surroundings
 from fdm.vehicle import Geodetic, Vehicle
 from scenarios import Scenario, offsets_ne
@@ -107,4 +108,11 @@ def _endpoint(scenario: Scenario, system: int, pad: Geodetic, seed: int) -> Endp
         seed=int(generator(seed, system, Purpose.TURBULENCE).integers(2**31)),
     )
     surroundings = Surroundings(scenario, vehicle=system, seed=seed)
-    return Endpoint(vehicle, surroundings, system=system, origin=pad, physics_hz=scenario.time.physics_hz)
+    return Endpoint(
+        vehicle,
+        surroundings,
+        system=system,
+        origin=pad,
+        physics_hz=scenario.time.physics_hz,
+        shape=shape_of(scenario),
+    )

@@ -5,6 +5,7 @@ import math
 from pymavlink.dialects.v20 import common as dialect
 
 from fdm.endpoint import Endpoint
+from fdm.shaping import shape_of
 from fdm.surroundings import Surroundings
 from fdm.vehicle import Geodetic, Vehicle
 from fdm.world import World
@@ -83,8 +84,9 @@ class Flight(Station):
         super().__init__()
         self.hz = hz
         vehicle = Vehicle(home=PLACE, yaw=yaw, physics_hz=hz)
-        surroundings = Surroundings(told or scenario(), vehicle=1, seed=seed)
-        self.endpoint = Endpoint(vehicle, surroundings, system=1, origin=PLACE, physics_hz=hz)
+        told = told or scenario()
+        surroundings = Surroundings(told, vehicle=1, seed=seed)
+        self.endpoint = Endpoint(vehicle, surroundings, system=1, origin=PLACE, physics_hz=hz, shape=shape_of(told))
         self.vehicle = vehicle
 
     @property
