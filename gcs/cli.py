@@ -13,6 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import App, CycloptsError, Parameter
 
 if TYPE_CHECKING:
+    from contextlib import ExitStack
+
+    from gcs.events import Rating
     from gcs.summary import Summary
     from scenarios import Scenario
 
@@ -56,7 +59,13 @@ class Choices:
             "package.module:function; the scenario's, if absent."
         ),
     ] = None
-    trust: Annotated[Literal["truth", "ratings"] | None, Parameter(help="Where trust comes from.")] = None
+    trust: Annotated[
+        Literal["truth", "ratings", "auto", "fused"] | None,
+        Parameter(
+            help="Where trust comes from: the simulation's knowledge, people (the study's means if nobody rates), "
+            "the swarm's own behaviour, or behaviour and people."
+        ),
+    ] = None
     severity: Annotated[
         float | None, Parameter(help="Speed left to degraded motors, 0 to 1 of cruise: the paper flies 0.4 and 0.7.")
     ] = None
@@ -94,11 +103,47 @@ class Choices:
         return loaded.with_severity(self.severity)
 
 
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Supervision:
+    """Who watches the flight, and says whom to trust."""
+
+    ratings: Annotated[str | None, Parameter(help="A file of ratings, or a simulated supervisor's name.")] = None
+    ratings_port: Annotated[
+        int | None, Parameter(help="Take ratings while flying, by TCP on this machine; 0 is any free port.")
+    ] = None
+
+    def known(self, scenario: Scenario, *, seed: int | None) -> tuple[Rating, ...] | None:
+        """Ratings known beforehand; None where nobody will rate at all. Raises BadUsageError and RatingsError."""
+        from gcs.ratings import chosen
+
+        if self.ratings is None and self.ratings_port is None:
+            return None
+        source = scenario.trust.source
+        if source not in ("ratings", "fused"):
+            option = "--ratings" if self.ratings is not None else "--ratings-port"
+            raise BadUsageError(f"{option}: trust from {source} takes no ratings; --trust ratings and fused do")
+        if self.ratings_port is not None and not 0 <= self.ratings_port <= 65535:
+            raise BadUsageError(f"--ratings-port {self.ratings_port}: must be 0 to 65535")
+        return () if self.ratings is None else chosen(self.ratings, scenario, seed=1 if seed is None else seed)
+
+    def live(self, stack: ExitStack, scenario: Scenario) -> Callable[[], tuple[Rating, ...]]:
+        """Where live ratings come from, open as long as the stack. Raises RatingsError."""
+        from gcs.inlet import Inlet
+
+        if self.ratings_port is None:
+            return tuple
+        inlet = stack.enter_context(Inlet(self.ratings_port, count=scenario.swarm.count))
+        _say(f"ratings are taken at 127.0.0.1, port {inlet.port}")
+        return inlet.take
+
+
 @app.command
 def run(
     scenario: ScenarioName,
     /,
     choices: Choices = Choices(),
+    supervision: Supervision = Supervision(),
     *,
     seed: Annotated[int, Parameter(help="Of noise, gusts and turbulence.")] = 1,
     out: Out = None,
@@ -114,8 +159,9 @@ def run(
 
         _check_seed(seed)
         chosen = choices.scenario(scenario)
+        ratings = supervision.known(chosen, seed=seed)
         world = Lockstep.of(chosen, seed=seed)
-        return _fly(scenario, chosen, world, world, seed=seed, out=out, json=json)
+        return _fly(scenario, chosen, world, world, supervision, ratings, seed=seed, out=out, json=json)
 
     return _guarded(command)
 
@@ -125,6 +171,7 @@ def fly(
     scenario: ScenarioName,
     /,
     choices: Choices = Choices(),
+    supervision: Supervision = Supervision(),
     *,
     link: Annotated[
         tuple[str, ...],
@@ -152,6 +199,7 @@ def fly(
         if not 0.0 < speed < math.inf:
             raise BadUsageError(f"--speed {speed}: must be a number above 0")
         chosen = choices.scenario(scenario).asking(LIVE_POSITIONS)
+        ratings = supervision.known(chosen, seed=seed)
         connections = [connection for text in link for connection in parse(text)]
         if arm and not _confirmed(yes):
             return BAD_INPUT
@@ -159,7 +207,7 @@ def fly(
         try:
             if not arm:
                 return listen(live, chosen, as_json=json, say=_say)
-            return _fly(scenario, chosen, live, live, seed=seed, out=out, json=json)
+            return _fly(scenario, chosen, live, live, supervision, ratings, seed=seed, out=out, json=json)
         finally:
             live.close()
 
@@ -246,7 +294,16 @@ def replay(
 
 
 def _fly(
-    name: str, scenario: Scenario, link: Any, clock: Any, *, seed: int | None, out: Path | None, json: bool
+    name: str,
+    scenario: Scenario,
+    link: Any,
+    clock: Any,
+    supervision: Supervision,
+    ratings: tuple[Rating, ...] | None,
+    *,
+    seed: int | None,
+    out: Path | None,
+    json: bool,
 ) -> int:
     """The one way a flight is flown, whatever it is flown with."""
     from contextlib import ExitStack
@@ -255,18 +312,31 @@ def _fly(
     from gcs.progress import Display
     from gcs.session import flown, make_room, output_folder
 
-    folder = output_folder(out, name)
-    earlier = make_room(folder)
-    if earlier is not None:
-        _say(f"an earlier recording is kept as {earlier}")
-    console = _stderr()
     with ExitStack() as stack:
-        operator = stack.enter_context(Operator(lambda words: console.print(words, highlight=False, markup=False)))
+        live_ratings = supervision.live(stack, scenario)
+        folder = output_folder(out, name)
+        earlier = make_room(folder)
+        if earlier is not None:
+            _say(f"an earlier recording is kept as {earlier}")
+        console = _stderr()
+        operator = stack.enter_context(
+            Operator(lambda words: console.print(words, highlight=False, markup=False), ratings=live_ratings)
+        )
 
         def watching(flight: Any) -> tuple[Display]:
             return (stack.enter_context(Display(flight, console, title=Path(name).stem)),)
 
-        summary = flown(name, scenario, link, clock, seed=seed, out=folder, operator=operator, watching=watching)
+        summary = flown(
+            name,
+            scenario,
+            link,
+            clock,
+            seed=seed,
+            out=folder,
+            operator=operator,
+            watching=watching,
+            ratings=ratings,
+        )
     _report(summary, folder, json=json)
     if operator.interrupted:
         return INTERRUPTED
@@ -326,6 +396,7 @@ def _guarded(command: Callable[[], int]) -> int:
 def _refusals() -> tuple[type[Exception], ...]:
     """What speaks to a person; anything else is a defect and keeps its traceback."""
     from gcs.compare import UnwritablePicture
+    from gcs.ratings import RatingsError
     from gcs.recording.reader import UnreadableRecording
     from gcs.recording.writer import RecordingError
     from gcs.rules import RuleError
@@ -338,6 +409,7 @@ def _refusals() -> tuple[type[Exception], ...]:
         RuleError,
         ConnectionRefused,
         RecordingError,
+        RatingsError,
         UnreadableRecording,
         UnwritablePicture,
     )

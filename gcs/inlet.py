@@ -119,10 +119,9 @@ class Inlet:
         try:
             self._listener.bind((HOST, port))
             self._listener.listen(CLIENTS)
-        except (OSError, OverflowError) as error:
+        except OSError as error:
             self._listener.close()
-            why = "must be 0 to 65535" if isinstance(error, OverflowError) else error.strerror
-            raise RatingsError(f"--ratings-port {port}: {why}") from None
+            raise RatingsError(f"--ratings-port {port}: {error.strerror or error}") from None
 
     def __enter__(self) -> Inlet:
         return self

@@ -11,6 +11,7 @@ from importlib.metadata import version
 from itertools import count
 from pathlib import Path
 
+from gcs.events import Rating
 from gcs.flight import Flight
 from gcs.flight_state import FlightState
 from gcs.loop import Clock, Link, Record, fly
@@ -37,13 +38,15 @@ def flown(
     out: Path,
     operator: Operator,
     watching: Callable[[Flight], Iterable[Record]],
+    ratings: Iterable[Rating] | None = None,
 ) -> Summary:
     """Fly a scenario over a link; leaves run.mcap, summary.json and trajectory.png in `out`.
 
-    name: how the summary calls the scenario;  watching: builds what shows the flight while it goes on.
+    name: how the summary calls the scenario;  watching: builds what shows the flight while it goes on;
+    ratings: known beforehand, () where only live ones may come, None where nobody rates.
     Raises RecordingError before take-off where `out` cannot be written.
     """
-    flight = Flight(scenario)
+    flight = Flight(scenario, ratings=ratings)
     truth = Truth(flight.ids)
     tracker = Tracker(flight, truth)
     began = time.perf_counter()
