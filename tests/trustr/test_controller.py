@@ -1,7 +1,7 @@
 """One tick of the swarm's control."""
 
 from dataclasses import replace
-from math import inf, nan
+from math import exp, inf, nan
 
 import numpy as np
 import pytest
@@ -11,6 +11,7 @@ from hypothesis.extra.numpy import arrays
 
 from gcs.control import settings
 from scenarios import load
+from trustr.consensus import RULES
 from trustr.controller import Observation
 from trustr.controller import decide as remember_and_decide
 from trustr.leader import VirtualLeader
@@ -22,6 +23,11 @@ VIRTUAL = VirtualLeader(np.array([3.0, 4.0]), np.array([1.2, 0.9]), np.array([0.
 REST = VirtualLeader(*np.zeros((3, 2)))
 
 profiles = pytest.mark.parametrize("profile", PROFILES)
+rules = pytest.mark.parametrize("rule", RULES)
+
+
+def flown_by(rule, profile):
+    return replace(SETTINGS[profile], rule=RULES[rule])
 
 
 def decide(observation, virtual, chosen, memory=None):
@@ -49,23 +55,39 @@ def in_formation(chosen, *, velocity=(0.0, 0.0), trust=1.0):
     )
 
 
+@rules
 @profiles
 @given(observations())
-def test_every_command_is_finite_and_the_unheard_are_told_to_stand_still(profile, observation):
-    decision = decide(observation, VIRTUAL, SETTINGS[profile])
+def test_every_command_is_finite_and_the_unheard_are_told_to_stand_still(profile, rule, observation):
+    decision = decide(observation, VIRTUAL, flown_by(rule, profile))
     known = np.isfinite(observation.position_ne).all(1) & np.isfinite(observation.velocity_ne).all(1)
     assert np.isfinite(decision.velocity_ne).all()
     assert not decision.velocity_ne[~(observation.heard & known)].any()
 
 
+@rules
+@given(observations())
+def test_between_a_robot_that_is_not_heard_and_any_other_the_weight_is_exactly_zero(rule, observation):
+    chosen = flown_by(rule, "paper")
+    memory, _ = remember_and_decide(None, observation, VIRTUAL, chosen)
+    decision = decide(replace(observation, time_s=3.0), VIRTUAL, chosen, memory)
+    known = np.isfinite(observation.position_ne).all(1) & np.isfinite(observation.velocity_ne).all(1)
+    silent = ~(observation.heard & known)
+    matrix = decision.graph.dense(decision.weights)
+    assert not matrix[np.ix_(~silent, silent)].any()
+    assert matrix[silent] == pytest.approx(np.eye(6)[silent], abs=1e-12)
+    assert matrix.sum(1) == pytest.approx(1, abs=1e-12)
+
+
+@rules
 @profiles
 @given(observations(), st.integers(0, 5), st.sampled_from([nan, inf, -inf]))
-def test_a_robot_that_tells_no_number_is_as_good_as_silent(profile, observation, robot, value):
+def test_a_robot_that_tells_no_number_is_as_good_as_silent(profile, rule, observation, robot, value):
     """Whatever else it says, nobody's command changes."""
     silent, babbling = observation.heard.copy(), observation.velocity_ne.copy()
     silent[robot], babbling[robot, 1] = False, value
-    one = decide(replace(observation, velocity_ne=babbling), VIRTUAL, SETTINGS[profile])
-    other = decide(replace(observation, heard=silent), VIRTUAL, SETTINGS[profile])
+    one = decide(replace(observation, velocity_ne=babbling), VIRTUAL, flown_by(rule, profile))
+    other = decide(replace(observation, heard=silent), VIRTUAL, flown_by(rule, profile))
     assert (one.velocity_ne == other.velocity_ne).all()
 
 
@@ -82,12 +104,13 @@ def test_what_a_silent_robot_was_last_heard_to_say_does_not_count(profile, obser
     assert (one.velocity_ne == other.velocity_ne).all()
 
 
+@rules
 @profiles
 @given(observations(), st.randoms(use_true_random=False))
-def test_names_of_robots_do_not_matter(profile, observation, random):
+def test_names_of_robots_do_not_matter(profile, rule, observation, random):
     order = list(range(6))
     random.shuffle(order)
-    chosen = SETTINGS[profile]
+    chosen = replace(flown_by(rule, profile), hand_over=False)  # of two equally near, the lower id takes over
     renamed = Observation(
         *(
             value[order]
@@ -168,11 +191,50 @@ def test_a_distrusted_robot_out_of_its_place_does_not_draw_the_others_along():
     assert (command[4] > 0).all()
 
 
+@rules
 @profiles
-def test_what_is_observed_stays_as_it_was(profile):
-    chosen = SETTINGS[profile]
+def test_what_is_observed_stays_as_it_was(profile, rule):
+    chosen = flown_by(rule, profile)
     seen = in_formation(chosen, velocity=(1.0, 0.0))
     before = seen.position_ne.copy(), seen.velocity_ne.copy()
     decide(seen, VIRTUAL, chosen)
     assert (seen.position_ne == before[0]).all()
     assert (seen.velocity_ne == before[1]).all()
+
+
+# --- what one tick leaves to the next
+
+
+def ticks(trusts, *, dt=0.1, rule="trust-r"):
+    """Memories after ticks at which everybody was trusted so much; velocities are the tick's number."""
+    chosen, memory, left = flown_by(rule, "paper"), None, []
+    for number, trust in enumerate(trusts):
+        seen = replace(in_formation(chosen, velocity=(number, 0.0), trust=trust), time_s=number * dt)
+        memory, _ = remember_and_decide(memory, seen, REST, chosen)
+        left.append(memory)
+    return left
+
+
+def test_standing_is_the_time_integral_of_trust_above_one_half():
+    *_, last = ticks([1.0] * 21 + [0.0] * 50)
+    assert last.standing == pytest.approx(np.full(6, 0.5 * 2.0 - 0.5 * 5.0))
+
+
+def test_standing_begins_at_nothing():
+    (first,) = ticks([0.0])
+    assert not first.standing.any()
+
+
+def test_the_first_velocity_is_kept():
+    *_, last = ticks([1.0] * 30)
+    assert not last.first_ne.any()
+
+
+def test_confidence_in_the_first_velocity_fades_from_tick_to_tick():
+    chosen = replace(flown_by("confidence-decay", "paper"), c1=0.0, c2=0.0)
+    begun = in_formation(chosen, velocity=(1.0, 0.0))
+    memory, first = remember_and_decide(None, begun, REST, chosen)
+    stopped = replace(in_formation(chosen), time_s=2.0)
+    later = decide(stopped, REST, chosen, memory)
+    assert first.velocity_ne == pytest.approx(begun.velocity_ne)
+    assert later.velocity_ne == pytest.approx(0.9 * exp(-0.5 * 2.0) * begun.velocity_ne)

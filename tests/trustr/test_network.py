@@ -1,5 +1,6 @@
 """Who hears whom (N_i), how well (eq. 13), with what weight (eq. 17)."""
 
+import itertools
 from math import exp, nan
 
 import numpy as np
@@ -167,6 +168,26 @@ def test_dense_and_sum_by_receiver_tell_the_same(swarm):
     graph = neighbours(position, heard, range_m=RANGE)
     values = trust[graph.sender]
     assert graph.sum_by_receiver(values) == pytest.approx(graph.dense(values).sum(1))
+
+
+@given(swarms() | large_swarms)
+def test_what_each_robot_hears_is_sorted_robot_by_robot(swarm):
+    position, heard, trust = swarm
+    graph = neighbours(position, heard, range_m=RANGE)
+    ordered, begins = graph.sorted_by_receiver(trust)
+    for robot, (begin, end) in enumerate(itertools.pairwise(begins)):
+        assert ordered[begin:end].tolist() == sorted(trust[graph.sender[graph.receiver == robot]])
+
+
+@given(swarms(), st.data())
+def test_who_is_taken_out_speaks_to_nobody_but_itself_and_still_listens(swarm, data):
+    position, heard, _ = swarm
+    graph = neighbours(position, heard, range_m=RANGE)
+    out = data.draw(arrays(bool, len(heard)))
+    everybody = graph.dense(np.ones_like(graph.distance))
+    without = graph.without(out)
+    expected = np.where(np.eye(len(heard), dtype=bool) | ~out, everybody, 0)
+    assert (without.dense(np.ones_like(without.distance)) == expected).all()
 
 
 # --- eq. 17

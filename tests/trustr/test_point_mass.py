@@ -92,6 +92,39 @@ def test_noise_changes_neither_verdict(rule, passes):
     assert sum(error <= 4.0 and off <= 3.2 for error, off in results) == passes
 
 
+BASELINES = [  # of the table, means over runs in noise: rule, severity, |heading error|, distance in transit
+    ("median", 0.4, 1.3, 1.4),
+    ("median", 0.7, 3.3, 3.0),
+    ("wmsr-1", 0.4, 0.7, 1.5),
+    ("wmsr-1", 0.7, 2.4, 2.8),
+    ("wmsr-2", 0.4, 1.6, 1.8),
+    ("wmsr-2", 0.7, 2.8, 2.6),
+]
+
+
+@pytest.mark.parametrize(("rule", "severity", "heading", "distance"), BASELINES)
+def test_baselines_end_where_the_reference_says(rule, severity, heading, distance):
+    told = scenario("transit", f"control.rule={rule}", severity=severity)
+    error, off = np.mean([flown(told, seed=seed) for seed in range(1, 7)], axis=0)
+    assert error == pytest.approx(heading, abs=1.0)
+    assert off == pytest.approx(distance, abs=0.5)
+
+
+@pytest.mark.parametrize("name", ["transit", "emergency"])
+@pytest.mark.parametrize("severity", [None, 0.4, 0.7])
+def test_with_confidence_that_fades_a_distrusted_robot_drags_nobody(name, severity):
+    error, off = flown(scenario(name, "control.rule=confidence-decay", severity=severity))
+    assert error < 2.0
+    assert off < 2.5
+
+
+def test_without_a_fault_rules_that_leave_out_extremes_leave_out_the_leaders():
+    """Who steers is an outlier until the others follow: two leaders of six are all that the median and F = 2 remove."""
+    flights = {rule: flown(scenario("emergency", f"control.rule={rule}")) for rule in ("average", "median", "wmsr-2")}
+    assert flights["average"][0] < 2.0
+    assert min(flights["median"][0], flights["wmsr-2"][0]) > 10.0
+
+
 @pytest.mark.parametrize("name", ["transit", "emergency"])
 def test_without_a_fault_both_rules_fly_alike(name):
     trusting = flown(scenario(name))
