@@ -67,7 +67,7 @@ def severity_of(scenario: Scenario) -> float | None:
 
 def trust_of(scenario: Scenario) -> str | None:
     """Where trust comes from, if the rule uses it."""
-    return None if scenario.control.rule == "average" else scenario.trust.source
+    return None if scenario.control.rule in ("average", "median", "wmsr-1", "wmsr-2") else scenario.trust.source
 
 
 def collision(closest_m: float | None) -> str | None:
