@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import platform
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 from itertools import count
@@ -38,7 +38,7 @@ def flown(
     out: Path,
     operator: Operator,
     watching: Callable[[Flight], Iterable[Record]],
-    ratings: Iterable[Rating] | None = None,
+    ratings: Sequence[Rating] | None = None,
 ) -> Summary:
     """Fly a scenario over a link; leaves run.mcap, summary.json and trajectory.png in `out`.
 
@@ -51,7 +51,8 @@ def flown(
     tracker = Tracker(flight, truth)
     began = time.perf_counter()
     start_ns = clock.now()
-    with Recorder(out / RECORDING, scenario, truth, start_ns=start_ns, metadata=_metadata(name, seed)) as recorder:
+    metadata = _metadata(name, seed, ratings)
+    with Recorder(out / RECORDING, scenario, truth, start_ns=start_ns, metadata=metadata) as recorder:
         state = fly(
             Tap(link, clock, recorder),
             clock,
@@ -128,12 +129,13 @@ def _namesakes(folder: Path, stem: str, suffix: str = "") -> Iterator[Path]:
         yield folder / f"{stem}-{number}{suffix}"
 
 
-def _metadata(name: str, seed: int | None) -> dict[str, str]:
-    """Versions, seed and wall time: outside the promise of same seed, same bytes."""
+def _metadata(name: str, seed: int | None, ratings: Sequence[Rating] | None) -> dict[str, str]:
+    """Versions, seed, who rates and wall time: outside the promise of same seed, same bytes."""
     packages = ("trustr", "jsbsim", "pymavlink", "numpy", "mcap")
     return {
         "scenario": name,
         "seed": "" if seed is None else str(seed),
+        "ratings": "" if ratings is None else "known beforehand" if ratings else "live",
         "started": dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
         "python": platform.python_version(),
         **{package: _version(package) for package in packages},
