@@ -8,13 +8,18 @@ from contextlib import closing, suppress
 
 import orjson
 import pytest
+from flights import SHORT, Saying, messages, scratch
 from hypothesis import given
 from hypothesis import strategies as st
 
 from gcs.events import LAND, Rating
 from gcs.inlet import BUFFER, CLIENTS, HOST, LINE, LINES_A_TICK, Conversation, Inlet
+from gcs.lockstep import Lockstep
 from gcs.operator import Operator
 from gcs.ratings import RatingsError, written
+from gcs.replay import decide_again
+from gcs.session import flown
+from scenarios import load
 
 BAD, GOOD = Rating("op1", 5, 1), Rating("op2", None, 4)
 
@@ -284,7 +289,7 @@ def test_closing_gives_the_port_back():
         assert again.port == port
 
 
-# --- beside the operator
+# --- beside the operator, and in a flight
 
 
 def test_an_operators_word_and_ratings_come_as_events_of_one_tick():
@@ -297,3 +302,41 @@ def test_an_operators_word_and_ratings_come_as_events_of_one_tick():
         os.kill(os.getpid(), 15)
         assert operator.events() == (LAND, BAD)
     assert len(said) == 1
+
+
+class Person:
+    """Watches a flight, and one second into its mission begins to say something each tick."""
+
+    def __init__(self, connection, ratings):
+        self._connection, self._ratings = connection, list(ratings)
+
+    def tick(self, tick):
+        if self._ratings and tick.diagnosis.mission_s >= 1.0:
+            self._connection.sendall(line(self._ratings.pop(0)))
+
+
+def test_live_ratings_are_recorded_at_the_tick_they_were_answered_with_and_the_flight_can_be_decided_again():
+    scenario = load("demo", overrides=[*SHORT, "trust.source=ratings"])
+    world, folder = Lockstep.of(scenario, seed=1), scratch()
+    with Inlet(0, count=6) as inlet, client(inlet) as one:
+        person = Person(one, [BAD] * 6 + [GOOD])
+        summary = flown(
+            "demo",
+            scenario,
+            world,
+            world,
+            seed=1,
+            out=folder,
+            operator=Saying(inlet.take),
+            watching=lambda _flight: (person,),
+            ratings=(),
+        )
+        one.shutdown(socket.SHUT_WR)
+        Ticked(inlet).until(lambda _: not inlet._clients)
+        answered = [orjson.loads(answer)["tick"] for answer in one.makefile("rb")]
+    recorded = [orjson.loads(data) for topic, _, data in messages(folder / "run.mcap") if topic == "/ratings"]
+    assert [rating["tick"] for rating in recorded] == answered
+    assert [(rating["vehicle"], rating["rating"]) for rating in recorded] == [(5, 1)] * 6 + [("swarm", 4)]
+    assert recorded[0]["trust"][4] > 0.5 > recorded[5]["trust"][4]
+    assert summary.false_alarms == 1
+    assert decide_again(folder).difference is None

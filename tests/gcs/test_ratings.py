@@ -104,6 +104,13 @@ def test_garbage_is_refused_and_does_nothing_else(garbage):
         parse(garbage, count=6)
 
 
+def test_a_line_of_the_recordings_topic_is_a_line_of_a_file():
+    recorded = line(tick=412, trust=[1.0] * 6)
+    assert parse(recorded, count=6) == parse(line(), count=6)
+    with pytest.raises(RatingsError, match="tick = 412: there is no such key"):
+        parse(line(tick=412, time_s=None), count=6, live=True)
+
+
 # --- a file
 
 
