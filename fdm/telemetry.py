@@ -206,16 +206,19 @@ def _boot_ms(now: Situation) -> int:
     return round(now.time_s * 1e3)
 
 
-METRES_A_DEGREE = 111_120.0
-"""Of latitude; good to 0.5 %, and used for decimetres of noise only."""
+EQUATOR_M, ECCENTRICITY_SQUARED = 6378137.0, 6.69437999014e-3
+"""WGS-84."""
 
 
 def _nearby(
     latitude: float, longitude: float, measured: tuple[float, ...], truth: tuple[float, ...]
 ) -> tuple[float, float]:
-    """The true place [degrees] moved by the error of the measured one [m]."""
+    """The true place [degrees] moved by the error of the measured one [m], by the radii of curvature there."""
     north, east = measured[0] - truth[0], measured[1] - truth[1]
+    bulge = 1.0 - ECCENTRICITY_SQUARED * math.sin(math.radians(latitude)) ** 2
+    along_parallel = EQUATOR_M / math.sqrt(bulge)
+    along_meridian = along_parallel * (1.0 - ECCENTRICITY_SQUARED) / bulge
     return (
-        latitude + north / METRES_A_DEGREE,
-        longitude + east / (METRES_A_DEGREE * math.cos(math.radians(latitude))),
+        latitude + math.degrees(north / along_meridian),
+        longitude + math.degrees(east / (along_parallel * math.cos(math.radians(latitude)))),
     )
