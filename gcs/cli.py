@@ -237,10 +237,7 @@ def reproduce(
         from gcs.reproduce import reproduce as fly_all
         from gcs.session import output_folder
 
-        if seeds < 1:
-            raise BadUsageError(f"--seeds {seeds}: must be at least 1")
-        if jobs == 0:
-            raise BadUsageError("--jobs 0: must be a number of processes, or -1 for one a core")
+        _check_many(seeds, jobs)
         folder = output_folder(out, "reproduce")
         try:
             result = fly_all(conditions(), seeds=seeds, jobs=jobs, console=_stderr())
@@ -254,6 +251,33 @@ def reproduce(
             result.show(_stdout())
             _say(f"written: {folder}/reproduce.json, {folder}/reproduce.md")
         return FLOWN
+
+    return _guarded(command)
+
+
+@app.command
+def experiment(
+    file: Annotated[str, Parameter(help="An experiment's name, or the path of a TOML file.")],
+    /,
+    *,
+    seeds: Annotated[int | None, Parameter(help="Flights a condition and arm: seeds 1 to this.")] = None,
+    jobs: Annotated[int, Parameter(help="Processes; −1 is one a core.")] = -1,
+    dask: Annotated[str | None, Parameter(help="Fly on the Dask cluster of this scheduler: tcp://HOST:PORT.")] = None,
+    only: Annotated[
+        tuple[str, ...],
+        Parameter(negative=(), help="Suites and conditions: NAME or SUITE/CONDITION, * for anything. Repeatable."),
+    ] = (),
+    out: Annotated[Path | None, Parameter(help="Folder, gone on with; runs/experiment-FILE if absent.")] = None,
+    json: AsJson = False,
+) -> int:
+    """Fly suites of conditions with several arms over the same seeds; called again, it goes on where it stopped."""
+
+    def command() -> int:
+        from gcs.experiment.command import experiment as conduct
+
+        _check_many(seeds, jobs)
+        console = None if json else _stdout()
+        return conduct(file, seeds=seeds, jobs=jobs, dask=dask, only=only, out=out, stdout=console, stderr=_stderr())
 
     return _guarded(command)
 
@@ -361,6 +385,13 @@ def _report(summary: Summary, folder: Path, *, json: bool) -> None:
 def _check_seed(seed: int | None) -> None:
     if seed is not None and seed < 0:
         raise BadUsageError(f"--seed {seed}: must not be negative")
+
+
+def _check_many(seeds: int | None, jobs: int) -> None:
+    if seeds is not None and seeds < 1:
+        raise BadUsageError(f"--seeds {seeds}: must be at least 1")
+    if jobs == 0:
+        raise BadUsageError("--jobs 0: must be a number of processes, or -1 for one a core")
 
 
 def _confirmed(yes: bool) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from gcs.events import Rating
+from gcs.events import Event, Rating
 from gcs.flight import Flight, Step
 from gcs.flight_state import FlightState, Phase
 from gcs.lockstep import Lockstep
@@ -49,7 +49,7 @@ def attempt(scenario: Scenario, *, seed: int, ratings: Iterable[Rating] = ()) ->
 class ToItsReadOut(Flight):
     """A flight that is done when it would land, whether its mission is over or given up."""
 
-    def __call__(self, state: FlightState, swarm: Swarm, events: Iterable[str], now_ns: int) -> Step:
+    def __call__(self, state: FlightState, swarm: Swarm, events: Iterable[Event], now_ns: int) -> Step:
         """One tick, as any flight's."""
         state, commands, diagnosis = super().__call__(state, swarm, events, now_ns)
         return (replace(state, phase=Phase.DONE) if state.phase is Phase.LAND else state), commands, diagnosis

@@ -11,7 +11,7 @@ ROOT = Path(__file__).parent.parent
 ROOMS = ("aircraft", "fdm", "gcs", "scenarios", "trustr", "wire")
 THIRD_PARTIES = {
     "numpy", "scipy", "pydantic", "pymavlink", "fastcrc", "jsbsim", "mcap", "pymap3d", "cyclopts", "rich",
-    "matplotlib", "mpl_toolkits", "joblib", "orjson",
+    "matplotlib", "mpl_toolkits", "joblib", "orjson", "distributed",
 }  # fmt: skip
 ALLOWED = {
     "aircraft": set(),

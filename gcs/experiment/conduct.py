@@ -1,0 +1,77 @@
+"""An experiment from its file to its results: fly what has not been flown yet, keep each run as it comes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+from gcs.experiment.journal import Journal
+from gcs.experiment.meter import Meter
+from gcs.experiment.run import RunResult, Task, code_digest, fly_run
+from gcs.experiment.workers import Workers
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """What this call took."""
+
+    flown: int
+    kept: int
+    """From earlier calls."""
+    workers: int
+    wall_s: float
+    runs_per_hour: float | None
+    """None where nothing was left to fly."""
+
+
+@dataclass(frozen=True, slots=True)
+class Conducted:
+    """Every run that was asked for."""
+
+    runs: list[RunResult]
+    """In the order of the tasks."""
+    timing: Timing
+
+
+def conduct(tasks: list[Task], workers: Callable[[], Workers], *, folder: Path, console: Console) -> Conducted:
+    """Fly what the folder's journal lacks. workers: hires them, if there is anything to fly.
+
+    Raises UnusableJournal, WorkersLost, and KeyboardInterrupt; whenever it ends, the finished runs are kept.
+    """
+    began = time.perf_counter()
+    with Journal(folder, code=code_digest()) as journal:
+        wanted = {task.key: task for task in tasks}
+        missing = [task for key, task in wanted.items() if key not in journal.runs]
+        kept, crashed, count = len(wanted) - len(missing), dict[str, RunResult](), 0
+        if journal.from_other_code:
+            _say(
+                console,
+                f"{journal.path}: {journal.from_other_code} of its runs were flown by other sources than these, under "
+                "the same version; they count all the same. Remove the file to fly them again.",
+            )
+        if missing:
+            hired = workers()
+            count = hired.count
+            _say(console, f"{len(wanted)} runs, {kept} of them kept from before; workers: {count}")
+            try:
+                with Meter(console, total=len(wanted), kept=kept) as meter:
+                    for run in hired.map(fly_run, missing):
+                        journal.add(run)
+                        if run.crashed:
+                            crashed[run.key] = run
+                        meter.advance()
+            finally:
+                hired.close()
+        outcome = journal.runs | crashed
+    wall_s = time.perf_counter() - began
+    pace = 3600 * len(missing) / wall_s if missing else None
+    timing = Timing(len(missing), kept, count, round(wall_s, 3), pace)
+    return Conducted([outcome[task.key].named_as(task) for task in tasks], timing)
+
+
+def _say(console: Console, words: str) -> None:
+    console.print(words, highlight=False, markup=False, soft_wrap=True)

@@ -1,0 +1,77 @@
+"""runs.jsonl: every finished run, one line each, written as it comes. What is there is not flown again."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from pathlib import Path
+from types import TracebackType
+
+from gcs.experiment.run import RunResult
+from gcs.recording.writer import RecordingError
+
+JOURNAL = "runs.jsonl"
+
+
+class UnusableJournal(RecordingError):
+    """A file of runs that cannot be gone on with, in one sentence."""
+
+
+class Journal:
+    """Reads what earlier calls left, then appends; one process at a time."""
+
+    def __init__(self, folder: Path, *, code: str) -> None:
+        self.path = folder / JOURNAL
+        self._code = code
+        self.runs: dict[str, RunResult] = {}
+        """By key."""
+        self.from_other_code = 0
+        """Of these, how many were flown by other sources under the same version."""
+
+    def __enter__(self) -> Journal:
+        try:
+            self._stream = self.path.open("a+b", buffering=0)
+        except OSError as error:
+            raise UnusableJournal(f"{self.path}: cannot be written: {error.strerror or error}") from None
+        try:
+            fcntl.flock(self._stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            self._stream.close()
+            raise UnusableJournal(f"{self.path}: another experiment is writing there") from None
+        try:
+            self._read()
+        except BaseException:
+            self._stream.close()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stream.close()
+
+    def add(self, run: RunResult) -> None:
+        """Keep a run, at once; but not one that crashed, which tells nothing and is to be flown again."""
+        if run.crashed:
+            return
+        try:
+            self._stream.write(run.line(self._code))
+        except OSError as error:
+            raise UnusableJournal(f"{self.path}: cannot be written: {error.strerror or error}") from None
+        self.runs[run.key] = run
+
+    def _read(self) -> None:
+        self._stream.seek(0)
+        content = self._stream.read()
+        whole = content.rfind(b"\n") + 1
+        if whole < len(content):  # a process was killed while it wrote
+            os.ftruncate(self._stream.fileno(), whole)
+        for number, line in enumerate(content[:whole].splitlines(), start=1):
+            try:
+                run, code = RunResult.of_line(line)
+            except (ValueError, TypeError, KeyError, AttributeError):
+                raise UnusableJournal(
+                    f"{self.path}, line {number}: is no run of this version: {line[:60].decode(errors='replace')!r}"
+                ) from None
+            self.runs[run.key] = run
+            self.from_other_code += code != self._code
