@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numpy.random import Generator
 
 from trustr.network import Array
 from trustr.rating import GIVEN_FAULTY, GIVEN_REPAIRED, HIGHEST, LOWEST
@@ -37,11 +38,11 @@ class Given(NamedTuple):
     rating: int
 
 
-Rater = Callable[[Array, Bools, np.random.Generator], list[Given]]
+Rater = Callable[[Array, Bools, Generator], list[Given]]
 
 
 def true(
-    time_s: Array, faulty: Bools, _rng: np.random.Generator, *, every_s: float = 3.0, reaction_s: float = 1.0
+    time_s: Array, faulty: Bools, _rng: Generator, *, every_s: float = 3.0, reaction_s: float = 1.0
 ) -> list[Given]:
     """Always right: 1 for the faulty, 5 for the healthy."""
     return [
@@ -56,7 +57,7 @@ slow = partial(true, every_s=10.0, reaction_s=8.0)
 
 
 def study(
-    time_s: Array, faulty: Bools, rng: np.random.Generator, *, every_s: float = 5.0, reaction_s: float = 2.0
+    time_s: Array, faulty: Bools, rng: Generator, *, every_s: float = 5.0, reaction_s: float = 2.0
 ) -> list[Given]:
     """Knows who is who, and rates as the study's participants did: exactly what `rating.evidence` takes people for."""
     return [
@@ -69,7 +70,7 @@ def study(
 def heterogeneous(
     time_s: Array,
     faulty: Bools,
-    rng: np.random.Generator,
+    rng: Generator,
     *,
     every_s: float = 5.0,
     reaction_s: float = 2.0,
@@ -100,7 +101,7 @@ more_heterogeneous = partial(heterogeneous, spread=3.7, faulty_centre=0.91, repa
 def realistic(
     time_s: Array,
     faulty: Bools,
-    rng: np.random.Generator,
+    rng: Generator,
     *,
     every_s: float = 5.0,
     reaction_s: float = 2.0,
@@ -125,7 +126,7 @@ def realistic(
 
 
 def lazy(
-    time_s: Array, faulty: Bools, _rng: np.random.Generator, *, every_s: float = 12.0, reaction_s: float = 3.0
+    time_s: Array, faulty: Bools, _rng: Generator, *, every_s: float = 12.0, reaction_s: float = 3.0
 ) -> list[Given]:
     """Right, but seldom, and only about the swarm as a whole."""
     return [
@@ -134,7 +135,7 @@ def lazy(
     ]
 
 
-def adversarial(time_s: Array, faulty: Bools, _rng: np.random.Generator) -> list[Given]:
+def adversarial(time_s: Array, faulty: Bools, _rng: Generator) -> list[Given]:
     """Knows all at once and says the opposite, at every time of the grid: 5 for the faulty, 1 for the healthy."""
     return [
         Given(float(when), row, BEST if fails else WORST)
@@ -164,11 +165,11 @@ def _glances(time_s: Array, faulty: Bools, *, every_s: float, reaction_s: float)
         yield when, faulty[index] if index >= 0 else np.zeros_like(faulty[0])
 
 
-def _drawn(fails: bool, rng: np.random.Generator) -> int:
+def _drawn(fails: bool, rng: Generator) -> int:
     return int(rng.choice(5, p=GIVEN_FAULTY if fails else GIVEN_REPAIRED)) + 1
 
 
-def _culprit(noticed: Bools, rng: np.random.Generator, *, named: float, area: float) -> int | None:
+def _culprit(noticed: Bools, rng: Generator, *, named: float, area: float) -> int | None:
     draw = rng.random()
     if draw < named:
         return int(rng.choice(np.flatnonzero(noticed))) if noticed.any() else None
