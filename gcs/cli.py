@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
-if TYPE_CHECKING:
-    from contextlib import ExitStack
+from gcs.supervision import NOBODY, Supervision
 
+if TYPE_CHECKING:
     from gcs.events import Rating
     from gcs.summary import Summary
     from scenarios import Scenario
@@ -103,47 +103,12 @@ class Choices:
         return loaded.with_severity(self.severity)
 
 
-@Parameter(name="*")
-@dataclass(frozen=True, kw_only=True)
-class Supervision:
-    """Who watches the flight, and says whom to trust."""
-
-    ratings: Annotated[str | None, Parameter(help="A file of ratings, or a simulated supervisor's name.")] = None
-    ratings_port: Annotated[
-        int | None, Parameter(help="Take ratings while flying, by TCP on this machine; 0 is any free port.")
-    ] = None
-
-    def known(self, scenario: Scenario, *, seed: int | None) -> tuple[Rating, ...] | None:
-        """Ratings known beforehand; None where nobody will rate at all. Raises BadUsageError and RatingsError."""
-        from gcs.ratings import chosen
-
-        if self.ratings is None and self.ratings_port is None:
-            return None
-        source = scenario.trust.source
-        if source not in ("ratings", "fused"):
-            option = "--ratings" if self.ratings is not None else "--ratings-port"
-            raise BadUsageError(f"{option}: trust from {source} takes no ratings; --trust ratings and fused do")
-        if self.ratings_port is not None and not 0 <= self.ratings_port <= 65535:
-            raise BadUsageError(f"--ratings-port {self.ratings_port}: must be 0 to 65535")
-        return () if self.ratings is None else chosen(self.ratings, scenario, seed=1 if seed is None else seed)
-
-    def live(self, stack: ExitStack, scenario: Scenario) -> Callable[[], tuple[Rating, ...]]:
-        """Where live ratings come from, open as long as the stack. Raises RatingsError."""
-        from gcs.inlet import Inlet
-
-        if self.ratings_port is None:
-            return tuple
-        inlet = stack.enter_context(Inlet(self.ratings_port, count=scenario.swarm.count))
-        _say(f"ratings are taken at 127.0.0.1, port {inlet.port}")
-        return inlet.take
-
-
 @app.command
 def run(
     scenario: ScenarioName,
     /,
     choices: Choices = Choices(),
-    supervision: Supervision = Supervision(),
+    supervision: Supervision = NOBODY,
     *,
     seed: Annotated[int, Parameter(help="Of noise, gusts and turbulence.")] = 1,
     out: Out = None,
@@ -171,7 +136,7 @@ def fly(
     scenario: ScenarioName,
     /,
     choices: Choices = Choices(),
-    supervision: Supervision = Supervision(),
+    supervision: Supervision = NOBODY,
     *,
     link: Annotated[
         tuple[str, ...],
@@ -337,7 +302,7 @@ def _fly(
     from gcs.session import flown, make_room, output_folder
 
     with ExitStack() as stack:
-        live_ratings = supervision.live(stack, scenario)
+        live_ratings = supervision.live(stack, scenario, _say)
         folder = output_folder(out, name)
         earlier = make_room(folder)
         if earlier is not None:
