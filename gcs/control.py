@@ -8,6 +8,8 @@ from gcs.rules import rehearse, rule
 from scenarios import Scenario, offsets_ne
 from trustr.controller import Settings
 
+BERTH = 3.0
+"""m: how `recommended` keeps clear of robots it does not trust."""
 REFERENCE_RESPONSE_S = 0.25
 """Response for which c1, c2 and the cap were found; `recommended` scales them by the fleet's own against it."""
 FORMATION_GAIN = 0.3
@@ -47,6 +49,17 @@ def settings(scenario: Scenario) -> Settings:
         confidence_decay=control.confidence_decay,
         separation_radius=control.separation_radius_m,
         separation_gain=control.separation_gain,
+        berth=_berth(scenario),
+        berth_gain=control.berth_gain,
     )
     rehearse(chosen)
     return chosen
+
+
+def _berth(scenario: Scenario) -> float:
+    """The berth of distrusted robots [m]; rules that know no trust give none."""
+    if scenario.control.rule in HEEDLESS:
+        return 0.0
+    if scenario.control.berth_m is not None:
+        return scenario.control.berth_m
+    return BERTH if scenario.control.profile == "recommended" else 0.0

@@ -149,6 +149,8 @@ class Control(Section):
     berth_m: NotNegative | None = None
     """Separation radius from robots that are not trusted; if absent, none of its own in the paper's profile, and 3 m in
     the recommended one."""
+    berth_gain: NotNegative = 0.6
+    """1/s: metres inside that radius to speed away."""
     response_time_s: Positive = 0.47
     """Mean lag of the vehicles' answer to a velocity step, ∫ (1 − v/v_step) dt; `recommended` scales with it."""
 

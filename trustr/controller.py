@@ -62,6 +62,10 @@ class Settings:
     """m."""
     separation_gain: float
     """1/s."""
+    berth: float
+    """m: the separation radius from robots whose trust is below the threshold; 0 makes no difference."""
+    berth_gain: float
+    """1/s."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,7 +161,15 @@ def decide(
             c2=settings.c2,
             cap=settings.feedback_cap,
         )
-    command += separation(around, position, radius=settings.separation_radius, gain=settings.separation_gain)
+    command += separation(
+        around,
+        position,
+        radius=settings.separation_radius,
+        gain=settings.separation_gain,
+        shunned=observation.trust < settings.threshold,
+        berth=settings.berth,
+        berth_gain=settings.berth_gain,
+    )
     return memory, Decision(_of_the_heard(command, heard), graph, weights, roles)
 
 
