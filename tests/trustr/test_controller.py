@@ -18,7 +18,14 @@ from trustr.leader import VirtualLeader
 from trustr.separation import separation
 
 PROFILES = ("paper", "recommended")
-SETTINGS = {name: settings(load("transit", overrides=[f"control.profile={name}"])) for name in PROFILES}
+
+
+def bound_to(profile, *overrides):
+    return settings(load("transit", overrides=[f"control.profile={profile}", *overrides]))
+
+
+SETTINGS = {name: bound_to(name) for name in PROFILES}
+WITHOUT_BERTH = {name: bound_to(name, "control.berth_m=0") for name in PROFILES}
 VIRTUAL = VirtualLeader(np.array([3.0, 4.0]), np.array([1.2, 0.9]), np.array([0.5, -0.5]))
 REST = VirtualLeader(*np.zeros((3, 2)))
 
@@ -126,8 +133,9 @@ def test_names_of_robots_do_not_matter(profile, rule, observation, random):
 @given(observations(), st.floats(-np.pi, np.pi))
 def test_turning_the_world_turns_the_commands(profile, observation, angle):
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    # one range for all, and no separation: rounding must not decide who is just inside a radius, or on which side
-    chosen = replace(SETTINGS[profile], range_m=1e6, best_range_m=1e5, separation_gain=0.0)
+    # one range for all, no separation, no hand-over: rounding must not decide who is just inside a radius, on which
+    # side, or the nearer of two
+    chosen = replace(WITHOUT_BERTH[profile], range_m=1e6, best_range_m=1e5, separation_gain=0.0, hand_over=False)
     position, velocity = (np.nan_to_num(value) for value in (observation.position_ne, observation.velocity_ne))
     seen = replace(observation, position_ne=position.clip(-40, 40), velocity_ne=velocity.clip(-3, 3))
     turned = decide(
@@ -182,7 +190,7 @@ def test_the_formation_gain_brings_a_displaced_robot_back_without_moving_the_mea
 
 
 def test_a_distrusted_robot_out_of_its_place_does_not_draw_the_others_along():
-    chosen = replace(SETTINGS["recommended"], eta=0.0)
+    chosen = replace(WITHOUT_BERTH["recommended"], eta=0.0)
     trust = np.array([1, 1, 1, 1, 0, 1.0])
     seen = replace(in_formation(chosen), trust=trust)
     seen.position_ne[4] += [-2.0, -2.0]

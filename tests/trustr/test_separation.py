@@ -55,3 +55,36 @@ def test_a_silent_robot_pushes_nobody():
 
 def test_a_radius_of_zero_turns_separation_off():
     assert not pushes([(0, 0), (0.001, 0)], radius=0.0).any()
+
+
+# --- a wide berth
+
+
+def shunning(position, *, shunned, berth=3.0, berth_gain=1.0):
+    position = np.array(position, float)
+    graph = neighbours(position, np.ones(len(position), bool), range_m=28.0)
+    return separation(
+        graph, position, radius=RADIUS, gain=GAIN, shunned=np.array(shunned), berth=berth, berth_gain=berth_gain
+    )
+
+
+@pytest.mark.parametrize("distance", [0.1, 1.0, 2.0, 2.9])
+def test_who_is_shunned_is_given_a_wide_berth_and_gives_none_itself(distance):
+    away, ordinary = -(3.0 - distance), GAIN * max(RADIUS - distance, 0)
+    push = shunning([(0, 0), (0, distance)], shunned=[False, True])
+    assert push == pytest.approx(np.array([[0, away], [0, ordinary]]))
+
+
+@pytest.mark.parametrize("distance", [3.0, 3.5, 20.0])
+def test_beyond_the_berth_nobody_is_pushed(distance):
+    assert not shunning([(0, 0), (0, distance)], shunned=[True, True]).any()
+
+
+def test_where_the_berth_is_less_than_the_radius_the_stronger_push_counts():
+    push = shunning([(0, 0), (0, 1)], shunned=[False, True], berth=0.5)
+    assert push[0] == pytest.approx([0, -GAIN * (RADIUS - 1)])
+
+
+@given(st.integers(1, 8).flatmap(lambda n: arrays(float, (n, 2), elements=st.floats(-3, 3))))
+def test_where_nobody_is_shunned_the_berth_makes_no_difference(position):
+    assert shunning(position, shunned=[False] * len(position)) == pytest.approx(pushes(position), abs=1e-12)
