@@ -137,6 +137,37 @@ def test_a_rotor_is_told_of_its_health_when_it_changes_and_only_then():
     assert vane.rotors == [(2, 0.7, 0.9), (2, 1.0, 1.0)]
 
 
+def test_wind_of_a_fault_comes_on_top_of_the_weather_from_its_onset_to_its_end_and_on_everyone_where_it_says_so():
+    weather = {"speed_m_s": 5, "from_deg": 180}
+    fault = {"vehicle": 1, "kind": "wind", "speed_m_s": 2, "from_deg": 270, "onset_s": 1, "end_s": 3, "everyone": True}
+    pair = {"rows": 1, "columns": 2, "leaders": [1]}
+    for vehicle in (1, 2):
+        surroundings, vane = settled(scenario(wind=weather, fault=[fault], swarm=pair), vehicle=vehicle)
+        surroundings.begin(vane, 10.0)
+        winds = renew(surroundings, vane, 10.0, 5.0)
+        assert np.array(winds[:10]) == pytest.approx(np.tile([5.0, 0.0, 0.0], (10, 1)), abs=1e-9)
+        assert np.array(winds[10:30]) == pytest.approx(np.tile([5.0, 2.0, 0.0], (20, 1)), abs=1e-9)
+        assert np.array(winds[30:]) == pytest.approx(np.tile([5.0, 0.0, 0.0], (20, 1)), abs=1e-9)
+
+
+def test_gusts_of_a_fault_leave_the_airs_own_gusts_as_they_are_and_come_again_in_the_next_mission():
+    fault = {"vehicle": 1, "kind": "wind", "speed_m_s": 0, "gust_m_s": 1.0}
+    gusty, calm = scenario(noise=NOISE, fault=[fault]), scenario(noise=NOISE)
+
+    def mission(told, start_s):
+        surroundings, vane = told
+        surroundings.begin(vane, start_s)
+        winds = np.array(renew(surroundings, vane, start_s, 60.0))
+        surroundings.end(vane)
+        assert vane.winds[-1] == vane.winds[0]
+        return winds
+
+    struck = settled(gusty)
+    both, own = mission(struck, 10.0), mission(settled(calm), 10.0)
+    assert (both - own)[:, :2].std() == pytest.approx(1.0, rel=5 / math.sqrt(2 * 2 * 60 / 4))
+    assert mission(struck, 90.0) == pytest.approx(both)
+
+
 def test_a_degraded_motor_acts_from_mission_start():
     fault = {"vehicle": 1, "kind": "motor_degradation"}
     surroundings, vane = settled(scenario(fault=[fault]))

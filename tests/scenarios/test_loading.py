@@ -3,10 +3,12 @@
 import json
 import re
 import tomllib
+from typing import get_args
 
 import pytest
 
 from scenarios import ScenarioError, find, load, names, parse
+from scenarios.faults import AnyFault
 
 # --- what ships
 
@@ -65,18 +67,35 @@ swarm = {rows = 3, columns = 4, spacing_m = 4.0, leaders = [1, 2], altitude_m = 
 mission = {cruise_m_s = 1.0, run_up_s = 0.0, leg = [{task = "look", heading_deg = 15.0, length_m = 25.0}]}
 event = [{kind = "redirect", at_length_m = 12.0, task = "call", heading_deg = -30.0, length_m = 20.0}]
 network = {range_m = 30.0, best_range_m = 5.0, decay = 1.0}
-trust = {source = "ratings", faulty_rating = 1.5, others_rating = 4.5}
 noise = {velocity_m_s = 0.2, position_m = 0.3, gust_m_s = 0.4, gust_time_s = 3.0}
 wind = {speed_m_s = 4.0, from_deg = 270.0, turbulence = 2.0, vehicles = [2, 3]}
+vehicle = {lag_s = 0.2, acceleration_m_s2 = 2.5, jerk_m_s3 = 5.0}
 limits = {speed_m_s = 4.0, acceleration_m_s2 = 3.0}
 expect = {heading_error_deg = 5.0, distance_to_target_m = 4.0, min_separation_m = 0.5}
+
 [[fault]]
 vehicle = 6
 kind = "motor_degradation"
 onset_s = 1.0
 end_s = 9.0
+grows_over_s = 5.0
+period_s = 4.0
+on_fraction = 0.25
 max_speed_fraction = 0.7
 offset_fraction = 0.2
+
+[trust]
+source = "ratings"
+faulty_rating = 1.5
+others_rating = 4.5
+response_delay_s = 0.2
+response_lag_s = 0.4
+tolerance_m_s = 0.1
+place_tolerance_m = 0.2
+age_out_s = 15.0
+hand_over = false
+beyond_repair = "land"
+
 [control]
 rule = "average"
 c1 = 0.2
@@ -85,9 +104,13 @@ feedback_cap = 0.5
 weights = "literal"
 eta = 0.5
 threshold = 0.4
+confidence = 0.8
+confidence_decay = 0.7
 profile = "recommended"
 separation_radius_m = 1.0
 separation_gain = 0.1
+berth_m = 2.5
+berth_gain = 0.2
 response_time_s = 0.9
 """)
 """A value for each key; all but the kinds differ from what the scenario has."""
@@ -120,6 +143,80 @@ def test_every_key_can_be_set(key, value):
 
 def test_the_table_above_has_every_key_there_is():
     assert dict(KEYS).keys() == dict(leaves(tables(load("emergency")))).keys()
+
+
+FAULTS = {
+    "motor_degradation": {"max_speed_fraction": 0.7, "offset_fraction": 0.2},
+    "rotor": {"rotor": 3, "efficiency": 0.6, "speed_limit": 0.9},
+    "compass_bias": {"bias_deg": -45.0},
+    "stuck_velocity": {},
+    "wind": {"speed_m_s": 6.0, "from_deg": 90.0, "gust_m_s": 1.0, "gust_time_s": 3.0, "everyone": True},
+    "gps_drift": {"rate_m_s": 0.3, "towards_deg": 90.0},
+    "gps_jump": {"distance_m": 8.0, "towards_deg": -90.0},
+    "false_report": {"offset_m_s": 0.6, "towards_deg": 180.0},
+    "lagging_telemetry": {"lag_s": 2.0},
+    "frozen_telemetry": {},
+}
+"""Every kind of fault, and a value other than its own for each key that only it has."""
+COMMON = {"vehicle": 2, "onset_s": 3.0, "end_s": 30.0, "grows_over_s": 5.0, "period_s": 4.0, "on_fraction": 0.25}
+
+
+def fault_tables(kind, keys):
+    told = {"vehicle": 1, "kind": kind} | ({"rotor": 1} if kind == "rotor" else {}) | keys
+    return f"fault=[{{{', '.join(f'{key}={json.dumps(value)}' for key, value in told.items())}}}]"
+
+
+def test_the_table_of_faults_has_every_kind_and_every_key_there_is():
+    members = get_args(get_args(AnyFault)[0])
+    assert {member.model_fields["kind"].annotation.__args__ for member in members} == {(kind,) for kind in FAULTS}
+    for member in members:
+        (kind,) = member.model_fields["kind"].annotation.__args__
+        assert {"kind"} | COMMON.keys() | FAULTS[kind].keys() == member.model_fields.keys()
+
+
+@pytest.mark.parametrize(("kind", "keys"), FAULTS.items(), ids=FAULTS)
+def test_every_key_of_every_kind_of_fault_can_be_set_and_none_but_a_rotor_must_be(kind, keys):
+    (bare,) = load("emergency", overrides=[fault_tables(kind, {})]).fault
+    (full,) = load("emergency", overrides=[fault_tables(kind, COMMON | keys)]).fault
+    for key, value in (COMMON | keys).items():
+        assert getattr(full, key) == value != getattr(bare, key)
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_every_kind_of_fault_refuses_what_it_does_not_know_and_says_what_it_does(kind):
+    with pytest.raises(ScenarioError) as refused:
+        load("emergency", overrides=[fault_tables(kind, {"grows_ovr_s": 3})])
+    said = str(refused.value)
+    assert f"{kind}." not in said
+    for word in ("fault.0.grows_ovr_s = 3: there is no such key", "did you mean grows_over_s?", *FAULTS[kind]):
+        assert word in said
+    for word in {key for keys in FAULTS.values() for key in keys} - FAULTS[kind].keys():
+        assert not re.search(rf"\b{word}\b", said)
+
+
+@pytest.mark.parametrize(
+    ("kind", "key", "value", "allowed"),
+    [
+        ("gps_drift", "rate_m_s", -1, "greater than or equal to 0"),
+        ("gps_jump", "distance_m", 1e9, "less than or equal to 1000"),
+        ("gps_jump", "towards_deg", 999, "less than or equal to 360"),
+        ("lagging_telemetry", "lag_s", 0, "greater than 0"),
+        ("lagging_telemetry", "lag_s", 11, "less than or equal to 10"),
+        ("compass_bias", "bias_deg", 270, "less than or equal to 180"),
+        ("false_report", "offset_m_s", "much", "number"),
+        ("wind", "everyone", "all", "boolean"),
+        ("wind", "gust_time_s", 0, "greater than 0"),
+        ("stuck_velocity", "grows_over_s", -1, "greater than or equal to 0"),
+        ("frozen_telemetry", "period_s", 0, "greater than 0"),
+        ("frozen_telemetry", "on_fraction", 0, "greater than 0"),
+        ("motor_degradation", "on_fraction", 1.5, "less than or equal to 1"),
+    ],
+)
+def test_a_severity_out_of_its_range_is_refused_by_its_key(kind, key, value, allowed):
+    with pytest.raises(ScenarioError) as refused:
+        load("emergency", overrides=[fault_tables(kind, {key: value})])
+    assert f"fault.0.{key} = {value!r}: " in str(refused.value)
+    assert allowed in str(refused.value)
 
 
 def test_many_keys_can_be_set_at_once_and_the_last_one_counts():
@@ -171,13 +268,16 @@ REFUSED = [
     ("noise.gust_m_s=-1", "noise.gust_m_s = -1", "greater than or equal to 0"),
     ("mission.cruise_m_s=fast", "mission.cruise_m_s = 'fast'", "number"),
     ("mission.cruise_m_s=9", "mission.cruise_m_s = 9", "limits.speed_m_s = 5"),
-    ("control.rule=best", "control.rule = 'best'", "'average' or 'trust-r'"),
+    ("control.rule=best", "control", "rule = 'best'", "average, trust-r", "package.module:function"),
+    ("vehicle.lag_s=-1", "vehicle.lag_s = -1", "greater than or equal to 0"),
+    ("vehicle.jerk_m_s3=0", "vehicle.jerk_m_s3 = 0", "greater than 0"),
+    ("vehicle.jerk=5", "vehicle.jerk = 5", "did you mean jerk_m_s3?", "lag_s, acceleration_m_s2, jerk_m_s3"),
     ("control.weights=none", "control.weights = 'none'", "'sender' or 'literal'"),
     ("control.profile=mine", "control.profile = 'mine'", "'paper' or 'recommended'"),
     ("control.eta=1.1", "control.eta = 1.1", "less than or equal to 1"),
     ("trust.source=oracle", "trust.source = 'oracle'", "'truth'", "'ratings'"),
     ("trust.faulty_rating=0.5", "trust.faulty_rating = 0.5", "greater than or equal to 1"),
-    ("fault.0.kind=wing", "fault.0.kind = 'wing'", "'motor_degradation', 'rotor'"),
+    ("fault.0.kind=wing", "fault.0.kind = 'wing'", "'motor_degradation', 'rotor', 'compass_bias'", "'wind'"),
     ('fault=[{vehicle=1, kind="rotor", rotor=7}]', "fault.0.rotor = 7", "less than or equal to 4"),
     ('fault=[{vehicle=1, kind="rotor"}]', "fault.0.rotor", "missing"),
     (

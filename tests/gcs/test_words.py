@@ -1,0 +1,49 @@
+"""What goes wrong, in plain words."""
+
+import pytest
+
+from gcs.words import faults
+from scenarios import load
+
+
+def said(**keys):
+    told = ", ".join(f"{key}={value}" for key, value in ({"vehicle": 5} | keys).items())
+    (words,) = faults(load("demo", overrides=[f"fault=[{{{told}}}]"]))
+    return words
+
+
+@pytest.mark.parametrize(
+    ("kind", "keys", "words"),
+    [
+        ("motor_degradation", {"max_speed_fraction": 0.7}, "robot 5 at 70% speed"),
+        ("rotor", {"rotor": 2, "efficiency": 0.0}, "a broken rotor on robot 5"),
+        ("rotor", {"rotor": 2, "efficiency": 0.6}, "a rotor of robot 5 at 60% thrust"),
+        ("rotor", {"rotor": 2, "speed_limit": 0.8}, "a rotor of robot 5 at 80% speed"),
+        ("compass_bias", {"bias_deg": -30}, "the compass of robot 5 off by -30°"),
+        ("stuck_velocity", {}, "robot 5 stuck with its set-point"),
+        ("wind", {"speed_m_s": 4}, "wind of 4 m/s on robot 5"),
+        ("wind", {"speed_m_s": 4, "gust_m_s": 1, "everyone": "true"}, "wind of 4 m/s and gusts of 1 m/s on everyone"),
+        ("gps_drift", {"rate_m_s": 0.25}, "the GPS of robot 5 drifting by 0.25 m/s"),
+        ("gps_jump", {"distance_m": 6}, "the GPS of robot 5 off by 6 m"),
+        ("false_report", {"offset_m_s": 0.5}, "robot 5 lying about its velocity by 0.5 m/s"),
+        ("lagging_telemetry", {"lag_s": 1.5}, "telemetry of robot 5 late by 1.5 s"),
+        ("frozen_telemetry", {}, "telemetry of robot 5 frozen"),
+    ],
+)
+def test_each_kind_is_named_with_what_matters_of_its_severity(kind, keys, words):
+    assert said(kind=f'"{kind}"', **keys) == words
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"onset_s": 12}, "from 12 s on"),
+        ({"end_s": 30}, "until 30 s"),
+        ({"onset_s": 12, "end_s": 30.5}, "from 12 s to 30.5 s"),
+        ({"grows_over_s": 8}, "growing over 8 s"),
+        ({"period_s": 10, "on_fraction": 0.3}, "on for 30% of every 10 s"),
+        ({"period_s": 10, "grows_over_s": 8, "onset_s": 2}, "growing over 8 s, on for 50% of every 10 s, from 2 s on"),
+    ],
+)
+def test_when_it_comes_and_goes_is_said_where_it_is_not_always_there(keys, words):
+    assert said(kind='"frozen_telemetry"', **keys) == f"telemetry of robot 5 frozen ({words})"
