@@ -7,17 +7,18 @@ Before the mission every robot is trusted.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from gcs.control import settings
 from gcs.events import Rating
 from gcs.telemetry import NEVER
 from scenarios import Scenario, healthy_robots
-from trustr.evidence import PRIOR, Evidence, Watch, trust_of, weigh
+from trustr.controller import Settings
+from trustr.evidence import INNOCENT, PRIOR, Evidence, Watch, trust_of, weigh
 from trustr.network import neighbours
 from trustr.rating import CAP, aged, study_trust, told
 from trustr.response import Response
@@ -27,8 +28,11 @@ Flags = npt.NDArray[np.bool_]
 
 SAYS_ALL = 6.0
 """Log odds that ratings may come to where nothing else is asked."""
-AN_ALLOWANCE_FOR_PLACE = 1.0
-"""m off its place, as far as a robot's way back may set it apart from its neighbours."""
+UNTOLD = -math.log(5.0)
+"""Log odds of being faulty where only people are asked and nobody has said anything: one robot in six, as in the paper.
+One bad rating shakes such trust, a second one breaks it."""
+A_WAY_BACK = 1.0
+"""m off its place, that a robot may be on its way back from."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,14 +70,14 @@ class Seen:
 class Beliefs:
     """The trust source of one flight."""
 
-    def __init__(self, scenario: Scenario, *, rated: bool) -> None:
+    def __init__(self, scenario: Scenario, control: Settings, *, rated: bool) -> None:
         trust = scenario.trust
         self._scenario = scenario
         self._source = trust.source
         self._watches = trust.source in ("auto", "fused")
         self._listens = trust.source == "fused" or (trust.source == "ratings" and rated)
         self._cap = CAP if self._watches else SAYS_ALL
-        self._watch = watch(scenario)
+        self._watch = watch(scenario, control)
         self._study = study_trust(
             ~healthy_robots(scenario), faulty_rating=trust.faulty_rating, others_rating=trust.others_rating
         )
@@ -88,7 +92,7 @@ class Beliefs:
         spoken = aged(belief.spoken, dt=self._watch.dt, age_out_s=self._scenario.trust.age_out_s)
         for rating in seen.ratings if self._listens else ():
             row = None if rating.vehicle is None else rating.vehicle - 1
-            suspicion = 1.0 - trust_of(_odds(belief))
+            suspicion = 1.0 - trust_of(self._odds(belief))
             spoken = told(spoken, suspicion, rating.rating, row, cap=self._cap)
             belief = replace(belief, spoken=spoken)
         return self._watched(replace(belief, spoken=spoken), seen) if self._watches else replace(belief, spoken=spoken)
@@ -99,7 +103,7 @@ class Beliefs:
             return self._truth(mission_s)
         if self._source == "ratings" and not self._listens:
             return self._study
-        return trust_of(_odds(belief))
+        return trust_of(self._odds(belief))
 
     def forgive(self, belief: Belief, robots: Flags) -> Belief:
         """Of these robots (N,), think as of robots nothing is known of."""
@@ -107,6 +111,12 @@ class Beliefs:
             return belief
         odds = np.where(robots, PRIOR, belief.evidence.log_odds)
         return replace(belief, evidence=replace(belief.evidence, log_odds=odds))
+
+    def _odds(self, belief: Belief) -> Array:
+        """(N,) log odds of being faulty, all told."""
+        if belief.evidence is not None:
+            return belief.spoken + belief.evidence.log_odds
+        return belief.spoken + (PRIOR if self._watches else UNTOLD)
 
     def _watched(self, belief: Belief, seen: Seen) -> Belief:
         here = seen.heard & np.isfinite(seen.position_ne).all(1) & np.isfinite(seen.velocity_ne).all(1)
@@ -139,24 +149,20 @@ class Beliefs:
         """0 for a robot while one of its faults is active, else 1."""
         believed = np.ones(self._scenario.swarm.count)
         for fault in self._scenario.fault:
-            if fault.active(mission_s):
-                believed[fault.vehicle - 1] = 0.0
+            if fault.blamed is not None and fault.active(mission_s):
+                believed[fault.blamed - 1] = 0.0
         return believed
 
 
-def watch(scenario: Scenario) -> Watch:
+def watch(scenario: Scenario, control: Settings) -> Watch:
     """How healthy robots of a scenario behave."""
-    trust, control = scenario.trust, settings(scenario)
-    apart = control.feedback_cap + control.separation_gain * control.separation_radius
+    trust = scenario.trust
+    back = control.formation_gain * A_WAY_BACK
+    apart = max(control.separation_gain * control.separation_radius, 0.5 * control.berth_gain * control.berth)
     return Watch(
         response=Response(trust.response_delay_s, trust.response_lag_s),
         tolerance=trust.tolerance_m_s,
         place_tolerance=trust.place_tolerance_m,
-        disagreement=apart + control.formation_gain * AN_ALLOWANCE_FOR_PLACE,
+        disagreement=(control.feedback_cap + apart + back) / INNOCENT,
         dt=scenario.time.period_s,
     )
-
-
-def _odds(belief: Belief) -> Array:
-    """(N,) log odds of being faulty, all told."""
-    return belief.spoken + (PRIOR if belief.evidence is None else belief.evidence.log_odds)

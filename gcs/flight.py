@@ -59,8 +59,6 @@ DOWN_BELOW = 0.25
 """Of the altitude to be held: a vehicle lower than that in a mission has come down."""
 TOLD_S = 2.0
 """A heartbeat is a second apart: what it says is believed this long after it may have changed."""
-STEERED = (Phase.TAKE_CONTROL, Phase.RUN_UP, Phase.MISSION)
-"""Phases in which set-points flow."""
 TAKES_BACK = 4
 """A rating from which the supervisor wants a robot back that was left behind."""
 BELOW = 3.0
@@ -83,7 +81,7 @@ class Flight:
         self.plan = mission.plan(scenario)
         self._settings = settings(scenario)
         self._offset_ne = offsets_ne(scenario)
-        self._beliefs = Beliefs(scenario, rated=ratings is not None)
+        self._beliefs = Beliefs(scenario, self._settings, rated=ratings is not None)
         self._leader = mission.PROFILES[scenario.control.profile]
         position_s = scenario.time.period_s / (scenario.time.positions_per_tick or 1)
         self._autopilot = Px4(height_m=scenario.swarm.altitude_m, position_s=position_s)
@@ -118,8 +116,7 @@ class Flight:
             state = abandoned(state)
         state = self._watch(state, swarm, now_ns)
         said = (*self._due(state), *(event for event in events if isinstance(event, Rating)))
-        if state.phase in STEERED:
-            state = self._believe(state, swarm, said, now_ns)
+        state = self._believe(state, swarm, said, now_ns)
         state, commands, diagnosis = self._phases[state.phase](state, swarm, now_ns)
         if state.tick % self.scenario.time.ticks(1.0) == 0:
             commands = [(system, Beat()) for system in self.ids] + commands

@@ -33,8 +33,8 @@ class Trial:
         return self.problem is None and self.score is not None and self.score.passed
 
 
-def attempt(scenario: Scenario, *, seed: int, ratings: Iterable[Rating] = ()) -> Trial:
-    """Fly a scenario from take-off to its read-out."""
+def attempt(scenario: Scenario, *, seed: int, ratings: Iterable[Rating] | None = None) -> Trial:
+    """Fly a scenario from take-off to its read-out. ratings: None where nobody rates."""
     flight = ToItsReadOut(scenario, ratings=ratings)
     truth = Truth(flight.ids)
     tracker = Tracker(flight, truth)

@@ -138,10 +138,10 @@ def fly_run(task: Task) -> RunResult:
     )
 
 
-def spoken(task: Task) -> tuple[Rating, ...]:
-    """What this task's people say, drawn from its seed."""
+def spoken(task: Task) -> tuple[Rating, ...] | None:
+    """What this task's people say, drawn from its seed; None where it has none."""
     if task.ratings is None:
-        return ()
+        return None
     from gcs.ratings import schedule
 
     return schedule(task.ratings, task.scenario, task.seed)
