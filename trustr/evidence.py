@@ -58,7 +58,7 @@ class Watch:
     place_tolerance: float
     """m: the same of the consistency residual."""
     disagreement: float
-    """m/s: how far a healthy robot's velocity may lie from its neighbours'."""
+    """m/s: spread of what sets a healthy robot's velocity apart from its neighbours', an axis."""
     dt: float
     """s, a tick."""
 
@@ -189,12 +189,22 @@ def neighbourhood(graph: Graph, velocity_ne: Array, trusted: Flags) -> Array:
 
 def accusations(evidence: Evidence, watch: Watch) -> tuple[Array, Array, Array]:
     """Log-likelihood ratio, faulty against healthy, of response, consistency and disagreement: (N,) each."""
+    response, consistency, disagreement = spreads(evidence, watch)
+    return (
+        _ratio(evidence.residual_ne, response),
+        _ratio(evidence.inconsistency_ne, consistency),
+        _ratio(evidence.disagreement_ne, disagreement),
+    )
+
+
+def spreads(evidence: Evidence, watch: Watch) -> tuple[float, float, float]:
+    """σ² of a healthy robot's response, consistency and disagreement residuals, an axis, telemetry's noise included."""
     passed = _passed(SMOOTHING_S, watch.dt)
     walked = evidence.velocity_noise * watch.dt**2 / (2.0 * _share(PLACE_MEMORY_S, watch.dt))
     return (
-        _ratio(evidence.residual_ne, watch.tolerance**2 + passed * evidence.velocity_noise),
-        _ratio(evidence.inconsistency_ne, watch.place_tolerance**2 + passed * evidence.place_noise + walked),
-        _ratio(evidence.disagreement_ne, watch.disagreement**2 + passed * evidence.velocity_noise),
+        watch.tolerance**2 + passed * evidence.velocity_noise,
+        watch.place_tolerance**2 + passed * evidence.place_noise + walked,
+        watch.disagreement**2 + passed * evidence.velocity_noise,
     )
 
 

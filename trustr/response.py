@@ -1,4 +1,4 @@
-"""How a healthy vehicle answers velocity commands: a delay, then a first-order lag; and how to find both from flights."""
+"""How a healthy vehicle answers velocity commands: a delay, then a first-order lag."""
 
 from __future__ import annotations
 
@@ -51,36 +51,3 @@ def followed(response: Response, first_ne: Array, commanded_ne: Array, *, dt: fl
     for tick in range(len(commanded_ne) - 1):
         flown[tick + 1] = follow(response, flown[tick], padded[tick : tick + depth], dt=dt)
     return flown
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Sample:
-    """One stretch of flight, T ticks of N vehicles."""
-
-    commanded_ne: Array
-    """(T, N, 2) m/s, sent at each tick."""
-    velocity_ne: Array
-    """(T, N, 2) m/s, measured at each tick."""
-    position_ne: Array
-    """(T, N, 2) m."""
-
-
-LONGEST_S = 3.0
-"""Delays and lags are looked for up to here."""
-
-
-def identify(samples: list[Sample], *, dt: float) -> Response:
-    """The response that explains measured velocities best, by least squares over delay and lag."""
-    from scipy.optimize import least_squares  # a third of a second to import, for one command
-
-    def errors(parameters: Array) -> Array:
-        response = Response(*map(float, parameters))
-        return np.concatenate(
-            [(s.velocity_ne - followed(response, s.velocity_ne[0], s.commanded_ne, dt=dt)).ravel() for s in samples]
-        )
-
-    best = min(
-        (least_squares(errors, start, bounds=(0.0, LONGEST_S), diff_step=1e-3) for start in ((0.15, 0.3), (0.4, 1.0))),
-        key=lambda fit: fit.cost,
-    )
-    return Response(*map(float, best.x))

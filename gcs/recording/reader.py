@@ -31,6 +31,9 @@ DAMAGE = (McapError, struct.error, LookupError, ValueError, TypeError, RuntimeEr
 """What a torn, flipped or foreign file makes the readers raise: mcap's own, LZ4's, and those of what they hand on."""
 
 
+Table = npt.NDArray[np.float64]
+
+
 class UnreadableRecording(ValueError):
     """A file that is no recording of ours, in one sentence."""
 
@@ -139,3 +142,37 @@ def ticks(path: Path) -> Iterator[RecordedTick]:
                 content = orjson.loads(message.data)
                 yield RecordedTick(message.log_time, received, sent, (*content["events"], *said))
                 received, sent, said = [], [], []
+
+
+SteeredTick = tuple[int, Table, Table, Table]
+"""(tick, set-points sent, velocities, positions), (N, 2) each: m/s and m, NaN where there is none."""
+
+
+def steered(path: Path) -> tuple[float, Iterator[SteeredTick]]:
+    """The tick's length [s], and every tick at which set-points flowed, in order. Raises UnreadableRecording."""
+    return read(path).scenario.time.period_s, _steered(path)
+
+
+def _steered(path: Path) -> Iterator[SteeredTick]:
+    setpoint: dict[str, Any] | None = None
+    with _readable(path), path.open("rb") as stream:
+        reader = NonSeekingReader(stream, validate_crcs=True, record_size_limit=RECORD_SIZE_LIMIT)
+        for _schema, channel, message in reader.iter_messages(log_time_order=False):
+            if channel.topic == "/setpoint":
+                setpoint = orjson.loads(message.data)
+            elif channel.topic == "/swarm/state":
+                fleet = orjson.loads(message.data)
+            elif channel.topic == "/tick" and setpoint is not None:
+                sent, commanded = _table(setpoint["sent"]), np.array(setpoint["commanded"])
+                yield (
+                    setpoint["tick"],
+                    np.where(commanded[:, None], sent, np.nan),
+                    _table(fleet["velocity_m_s"]),
+                    _table(fleet["position_m"]),
+                )
+                setpoint = None
+
+
+def _table(rows: list[list[float | None]]) -> Table:
+    """North and east of a topic's table; null is NaN."""
+    return np.array(rows, dtype=np.float64)[:, :2]

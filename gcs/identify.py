@@ -1,0 +1,108 @@
+"""`gcs identify`: what a fleet's healthy vehicles are like, from simulated flights or a recording of real ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import orjson
+
+from gcs.loop import Tick, fly
+from gcs.recording.reader import SteeredTick, UnreadableRecording, located, steered
+from gcs.trial import ToItsReadOut
+from scenarios import Scenario
+from trustr.identification import SETTLING_S, Identified, Sample, identify
+from trustr.network import Array
+
+SHORTEST_S = 2.0 * SETTLING_S
+"""Of set-points in a recording."""
+
+
+def of_scenario(scenario: Scenario, *, seeds: int, progress: Any) -> Identified:
+    """Fly a scenario without its faults so many times, and identify its vehicles; progress: wraps the seeds."""
+    healthy = scenario.without_faults()
+    return identify([_flown(healthy, seed) for seed in progress(range(1, seeds + 1))], dt=scenario.time.period_s)
+
+
+def of_recording(path: Path) -> Identified:
+    """Identify the vehicles of a recording in which nothing failed. Raises UnreadableRecording."""
+    path = located(path)
+    period_s, ticks = steered(path)
+    samples = [sample for sample in _stretches(ticks) if len(sample.velocity_ne) * period_s >= SHORTEST_S]
+    if not samples:
+        raise UnreadableRecording(
+            f"{path}: holds no {SHORTEST_S:g} s of set-points to every vehicle with all of them heard"
+        )
+    return identify(samples, dt=period_s)
+
+
+def as_json(found: Identified) -> bytes:
+    """One object."""
+    response = found.response
+    return orjson.dumps(
+        {
+            "response_delay_s": response.delay_s,
+            "response_lag_s": response.lag_s,
+            "response_time_s": response.mean_lag_s,
+            "tolerance_m_s": found.tolerance,
+            "place_tolerance_m": found.place_tolerance,
+            "unexplained_m_s": found.unexplained,
+            "moved_m_s": found.moved,
+        }
+    )
+
+
+def as_toml(found: Identified) -> str:
+    """Lines for a scenario, and what they explain."""
+    response = found.response
+    return (
+        f"# velocities moved by {found.moved:.2f} m/s; the response leaves {found.unexplained:.3f} m/s unexplained\n"
+        f"[control]\nresponse_time_s = {response.mean_lag_s:.3f}\n\n"
+        f"[trust]\nresponse_delay_s = {response.delay_s:.3f}\nresponse_lag_s = {response.lag_s:.3f}\n"
+        f"tolerance_m_s = {found.tolerance:.3f}\nplace_tolerance_m = {found.place_tolerance:.3f}"
+    )
+
+
+class _Logbook:
+    """A `Record` of set-points and of what telemetry made of them."""
+
+    def __init__(self) -> None:
+        self.entries: list[tuple[Array, ...]] = []
+
+    def tick(self, tick: Tick) -> None:
+        """Keep a tick at which set-points flowed."""
+        diagnosis = tick.diagnosis
+        if diagnosis.sent_ned is not None:
+            velocity = tick.swarm.velocity_ned[:, :2]
+            self.entries.append((diagnosis.sent_ned[:, :2].copy(), velocity.copy(), diagnosis.position_ne.copy()))
+
+    @property
+    def sample(self) -> Sample:
+        """All of it."""
+        return Sample(*(np.array(column) for column in zip(*self.entries, strict=True)))
+
+
+def _flown(scenario: Scenario, seed: int) -> Sample:
+    from gcs.lockstep import Lockstep
+
+    logbook, world = _Logbook(), Lockstep.of(scenario, seed=seed)
+    fly(world, world, ToItsReadOut(scenario), (logbook,), period_ns=scenario.time.period_ns)
+    return logbook.sample
+
+
+def _stretches(ticks: Iterator[SteeredTick]) -> Iterator[Sample]:
+    """Samples without a gap: consecutive ticks in which every vehicle was commanded and heard."""
+    stretch: list[tuple[Array, ...]] = []
+    before = None
+    for number, commanded, velocity, position in ticks:
+        whole = bool(np.isfinite(commanded).all() and np.isfinite(velocity).all() and np.isfinite(position).all())
+        if stretch and (not whole or number != (before or 0) + 1):
+            yield Sample(*(np.array(column) for column in zip(*stretch, strict=True)))
+            stretch = []
+        if whole:
+            stretch.append((commanded, velocity, position))
+        before = number
+    if stretch:
+        yield Sample(*(np.array(column) for column in zip(*stretch, strict=True)))
