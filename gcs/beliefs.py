@@ -160,7 +160,12 @@ def watch(scenario: Scenario, control: Settings) -> Watch:
     back = control.formation_gain * A_WAY_BACK
     apart = max(control.separation_gain * control.separation_radius, 0.5 * control.berth_gain * control.berth)
     return Watch(
-        response=Response(trust.response_delay_s, trust.response_lag_s),
+        response=Response(
+            trust.response_delay_s,
+            trust.response_lag_s,
+            trust.response_acceleration_m_s2 or math.inf,
+            trust.response_jerk_m_s3 or math.inf,
+        ),
         tolerance=trust.tolerance_m_s,
         place_tolerance=trust.place_tolerance_m,
         disagreement=(control.feedback_cap + apart + back) / INNOCENT,

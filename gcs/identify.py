@@ -15,6 +15,7 @@ from gcs.trial import ToItsReadOut
 from scenarios import Scenario
 from trustr.identification import SETTLING_S, Identified, Sample, identify
 from trustr.network import Array
+from trustr.response import Response, mean_lag_s
 
 SHORTEST_S = 2.0 * SETTLING_S
 """Of set-points in a recording."""
@@ -38,31 +39,35 @@ def of_recording(path: Path) -> Identified:
     return identify(samples, dt=period_s)
 
 
+def keys(found: Identified) -> dict[str, dict[str, float]]:
+    """Section → key → value, as a scenario has them."""
+    return {
+        "control": {"response_time_s": mean_lag_s(found.response)},
+        "trust": _response_keys(found.response)
+        | {"tolerance_m_s": found.tolerance, "place_tolerance_m": found.place_tolerance},
+    }
+
+
 def as_json(found: Identified) -> bytes:
     """One object."""
-    response = found.response
-    return orjson.dumps(
-        {
-            "response_delay_s": response.delay_s,
-            "response_lag_s": response.lag_s,
-            "response_time_s": response.mean_lag_s,
-            "tolerance_m_s": found.tolerance,
-            "place_tolerance_m": found.place_tolerance,
-            "unexplained_m_s": found.unexplained,
-            "moved_m_s": found.moved,
-        }
-    )
+    return orjson.dumps({**keys(found), "unexplained_m_s": found.unexplained, "moved_m_s": found.moved})
 
 
 def as_toml(found: Identified) -> str:
     """Lines for a scenario, and what they explain."""
-    response = found.response
-    return (
-        f"# velocities moved by {found.moved:.2f} m/s; the response leaves {found.unexplained:.3f} m/s unexplained\n"
-        f"[control]\nresponse_time_s = {response.mean_lag_s:.3f}\n\n"
-        f"[trust]\nresponse_delay_s = {response.delay_s:.3f}\nresponse_lag_s = {response.lag_s:.3f}\n"
-        f"tolerance_m_s = {found.tolerance:.3f}\nplace_tolerance_m = {found.place_tolerance:.3f}"
-    )
+    lines = [f"# velocities moved by {found.moved:.2f} m/s; {found.unexplained:.3f} m/s of it is left unexplained"]
+    for section, values in keys(found).items():
+        lines += [f"[{section}]", *(f"{key} = {value:.3f}" for key, value in values.items()), ""]
+    return "\n".join(lines).rstrip()
+
+
+def _response_keys(response: Response) -> dict[str, float]:
+    bounds = {"response_acceleration_m_s2": response.acceleration, "response_jerk_m_s3": response.jerk}
+    return {
+        "response_delay_s": response.delay_s,
+        "response_lag_s": response.lag_s,
+        **{key: value for key, value in bounds.items() if np.isfinite(value)},
+    }
 
 
 class _Logbook:

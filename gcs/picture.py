@@ -17,6 +17,7 @@ from matplotlib.lines import Line2D
 
 from gcs.mission import Plan, plan
 from gcs.scoring import Score, score
+from gcs.summary import trust_of
 from gcs.track import Track
 from scenarios import Scenario, healthy_robots, offsets_ne
 
@@ -27,6 +28,12 @@ ABANDONED = "#b8b8b8"
 LABEL = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.75}
 DPI = 120
 mpl.rcParams["text.parse_math"] = False  # a title or a task may hold a dollar sign
+NAMES = {
+    "average": "Averaged update (eq. 1)",
+    "median": "Coordinate-wise median",
+    "wmsr-1": "W-MSR, F = 1",
+    "wmsr-2": "W-MSR, F = 2",
+}
 PANEL_WIDTH, TRUST_HEIGHT = 5.8, 1.3
 """Inches."""
 
@@ -72,10 +79,11 @@ def draw_side_by_side(panels: Sequence[Panel], path: Path, *, heading: str) -> N
 def controller_name(scenario: Scenario) -> str:
     """How a person calls this flight's controller."""
     control = scenario.control
-    if control.rule == "average":
-        return "Averaged update (eq. 1)"
+    if control.rule in NAMES:
+        return NAMES[control.rule]
     profile = "" if control.profile == "paper" else f", {control.profile} profile"
-    return f"Trust-R, trust from {scenario.trust.source}{profile}"
+    rule = {"trust-r": "Trust-R", "confidence-decay": "Confidence decay"}.get(control.rule, control.rule)
+    return f"{rule}, trust from {scenario.trust.source}{profile}"
 
 
 Window = tuple[tuple[float, float], tuple[float, float]]
@@ -180,9 +188,9 @@ def _trust(axes: Any, panel: Panel, *, first: bool) -> None:
     track, scenario = panel.track, panel.scenario
     healthy = healthy_robots(scenario)
     path = plan(scenario)
-    if scenario.control.rule == "average":
+    if trust_of(scenario) is None:
         axes.text(
-            0.97, 0.75, "the averaged update heeds everyone alike",
+            0.97, 0.75, "this rule asks for no trust",
             ha="right", va="center", transform=axes.transAxes, color=PLANNED,
         )  # fmt: skip
     else:
@@ -205,7 +213,7 @@ def _trust(axes: Any, panel: Panel, *, first: bool) -> None:
 
 
 def _legend(panels: Sequence[Panel]) -> list[Line2D]:
-    faulty = sorted({fault.vehicle for panel in panels for fault in panel.scenario.fault})
+    faulty = sorted({row + 1 for panel in panels for row in np.flatnonzero(~healthy_robots(panel.scenario))})
     handles = [
         Line2D([], [], color=PLANNED, ls="--", lw=1.8, label="planned path"),
         Line2D([], [], color="black", lw=2.4, label="mean of the healthy robots"),

@@ -91,7 +91,10 @@ def min_separation(position: Array) -> float:
 def _detected(track: Track, scenario: Scenario) -> dict[int, float]:
     found: dict[int, float] = {}
     for fault in scenario.fault:
-        below = track.time_s[(track.trust[:, fault.vehicle - 1] < DISTRUSTED) & (track.time_s >= fault.onset_s - 1e-9)]
-        if below.size and fault.vehicle not in found:
-            found[fault.vehicle] = round(float(below[0]) - fault.onset_s, 6)
+        blamed = fault.blamed
+        if blamed is None or blamed in found:
+            continue
+        below = track.time_s[(track.trust[:, blamed - 1] < DISTRUSTED) & (track.time_s >= fault.onset_s - 1e-9)]
+        if below.size:
+            found[blamed] = round(float(below[0]) - fault.onset_s, 6)
     return found

@@ -201,7 +201,11 @@ class Trust(Section):
     response_delay_s: Annotated[float, Field(ge=0, le=3)] = 0.147
     """How healthy vehicles answer a velocity set-point: not at all for so long …"""
     response_lag_s: Annotated[float, Field(ge=0, le=3)] = 0.298
-    """… then as a first-order lag. `gcs identify` finds both, and the two tolerances, from fault-free flights."""
+    """… then as a first-order lag. `gcs identify` finds these four, and the two tolerances, from fault-free flights."""
+    response_acceleration_m_s2: Positive | None = None
+    """Where vehicles bound their acceleration; with the next key."""
+    response_jerk_m_s3: Positive | None = None
+    """Where vehicles bound its change."""
     tolerance_m_s: Positive = 0.05
     """σ_h: how far a healthy vehicle's velocity strays from that answer, an axis."""
     place_tolerance_m: Positive = 0.1
@@ -213,6 +217,12 @@ class Trust(Section):
     beyond_repair: Literal["keep", "hold", "land"] = "keep"
     """What becomes of a robot whose trust stays below 0.05 for 5 s: it is kept, or left behind, holding below the
     others or landing."""
+
+    @model_validator(mode="after")
+    def _both_bounds(self) -> Trust:
+        if (self.response_acceleration_m_s2 is None) != (self.response_jerk_m_s3 is None):
+            raise ValueError("response_acceleration_m_s2 and response_jerk_m_s3: both bounds of the response, or neither")
+        return self
 
 
 class Noise(Section):

@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from trustr.leader import capped
 from trustr.network import Array, Graph
-from trustr.response import Response, follow, held_back
+from trustr.response import Motion, Response, follow, held_back
 
 Flags = npt.NDArray[np.bool_]
 
@@ -69,8 +69,8 @@ class Evidence:
 
     commanded_ne: Array
     """(D, N, 2) m/s: the commands of the last ticks, newest last."""
-    expected_ne: Array
-    """(N, 2) m/s: what healthy robots would fly now."""
+    expected: Motion
+    """What healthy robots would fly now."""
     raw_ne: Array
     """(N, 2) m/s: the response residual, as measured."""
     residual_ne: Array
@@ -96,7 +96,7 @@ class Evidence:
         nothing = np.zeros_like(velocity_ne)
         return Evidence(
             commanded_ne=np.repeat(commanded_ne[None], held_back(watch.response, watch.dt), axis=0),
-            expected_ne=velocity_ne,
+            expected=Motion(velocity_ne, nothing),
             raw_ne=nothing,
             residual_ne=nothing,
             predicted_ne=position_ne,
@@ -126,10 +126,10 @@ def weigh(
     graph: who hears whom; without it (before the mission) robots are watched and not yet judged.
     """
     commanded = np.concatenate([evidence.commanded_ne[1:], commanded_ne[None]])
-    expected = follow(watch.response, evidence.expected_ne, commanded, dt=watch.dt)
+    expected = follow(watch.response, evidence.expected, commanded, dt=watch.dt)
     smooth, remember = _share(SMOOTHING_S, watch.dt), _share(NOISE_MEMORY_S, watch.dt)
 
-    raw = _update(evidence.raw_ne, capped(velocity_ne - expected, WILDEST), told)
+    raw = _update(evidence.raw_ne, capped(velocity_ne - expected.velocity_ne, WILDEST), told)
     residual = _update(evidence.residual_ne, evidence.residual_ne + smooth * (raw - evidence.residual_ne), told)
     velocity_noise = _noise(evidence.velocity_noise, raw - evidence.raw_ne, told, remember)
 
@@ -142,7 +142,7 @@ def weigh(
     watched = replace(
         evidence,
         commanded_ne=commanded,
-        expected_ne=expected,
+        expected=expected,
         raw_ne=raw,
         residual_ne=residual,
         predicted_ne=predicted,

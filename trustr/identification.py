@@ -16,6 +16,11 @@ LONGEST_S = 3.0
 """Delays and lags are looked for up to here."""
 STARTS = ((0.15, 0.3), (0.4, 1.0))
 """Delay and lag [s] from which the fit begins: quick vehicles, and slow ones."""
+BOUNDED_START = (0.3, 0.3, 2.5, 5.0)
+LEAST, MOST = (0.0, 0.02, 0.2, 0.2), (LONGEST_S, LONGEST_S, 20.0, 50.0)
+"""Delay, lag [s], acceleration [m/s²] and jerk [m/s³] of vehicles with bounds: where the fit begins, and its limits."""
+WORTH_IT = 0.9
+"""Of the squared error: bounds that take off less than a tenth are no bounds."""
 SETTLING_S = 3.0
 """Of each flight, until noise has been estimated; not judged."""
 TAIL = 0.001
@@ -58,24 +63,31 @@ def identify(samples: Sequence[Sample], *, dt: float) -> Identified:
 
     dt: s, a tick;  samples: at least one, of at least SETTLING_S and some.
     """
-    from scipy.optimize import least_squares  # a third of a second to import, for one command
-
-    def errors(parameters: Array) -> Array:
-        response = Response(*map(float, parameters))
-        return np.concatenate([_unexplained(sample, response, dt).ravel() for sample in samples])
-
-    fits = [least_squares(errors, start, bounds=(0.0, LONGEST_S), diff_step=1e-3) for start in STARTS]
-    best = min(fits, key=lambda fit: float(fit.cost))
-    response = Response(*map(float, best.x))
+    response, errors = _best(samples, dt)
     tolerance, place_tolerance = _tolerances(samples, response, dt)
     velocities = [sample.velocity_ne - sample.velocity_ne.mean(axis=0) for sample in samples]
     return Identified(
         response=response,
         tolerance=tolerance,
         place_tolerance=place_tolerance,
-        unexplained=float(np.sqrt(np.mean(best.fun**2))),
+        unexplained=float(np.sqrt(np.mean(errors**2))),
         moved=float(np.sqrt(np.mean(np.concatenate([velocity.ravel() for velocity in velocities]) ** 2))),
     )
+
+
+def _best(samples: Sequence[Sample], dt: float) -> tuple[Response, Array]:
+    """The response that leaves the least unexplained, and what that is; with bounds only where they explain more."""
+    from scipy.optimize import least_squares  # a third of a second to import, for one command
+
+    def errors(parameters: Array) -> Array:
+        response = Response(*map(float, parameters))
+        return np.concatenate([_unexplained(sample, response, dt).ravel() for sample in samples])
+
+    free = [least_squares(errors, start, bounds=(0.0, LONGEST_S), diff_step=1e-3) for start in STARTS]
+    without = min(free, key=lambda fit: float(fit.cost))
+    with_bounds = least_squares(errors, BOUNDED_START, bounds=(LEAST, MOST), diff_step=1e-2, x_scale=BOUNDED_START)
+    best = with_bounds if with_bounds.cost < WORTH_IT * without.cost else without
+    return Response(*map(float, best.x)), np.asarray(best.fun)
 
 
 def _unexplained(sample: Sample, response: Response, dt: float) -> Array:

@@ -50,7 +50,7 @@ def hand_over(roles: Roles, *, trust: Array, heard: Flags, offset_ne: Array) -> 
         free = np.flatnonzero(fit & (trust >= GAINS) & ~np.isin(np.arange(len(trust)), leaders))
         if not free.size:
             break
-        away = np.hypot(*(offset_ne[free] - offset_ne[leaders[place]]).T)
+        away = np.hypot(*(offset_ne[free] - offset_ne[leaders[place]]).T).round(3)  # whichever way the formation points
         leaders[place] = free[np.lexsort((away, -np.round(trust[free], 1)))[0]]
     return replace(roles, leaders=leaders)
 
