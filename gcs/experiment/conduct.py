@@ -47,12 +47,10 @@ def conduct(tasks: list[Task], workers: Callable[[], Workers], *, folder: Path, 
         wanted = {task.key: task for task in tasks}
         missing = [task for key, task in wanted.items() if key not in journal.runs]
         kept, crashed, count = len(wanted) - len(missing), dict[str, RunResult](), 0
-        if journal.from_other_code:
-            _say(
-                console,
-                f"{journal.path}: {journal.from_other_code} of its runs were flown by other sources than these, under "
-                "the same version; they count all the same. Remove the file to fly them again.",
-            )
+        strangers = len(journal.from_other_code & wanted.keys())
+        if strangers:
+            words = f"{strangers} runs were flown by other sources than these, under the same version; they count"
+            _say(console, f"{journal.path}: {words} all the same. Remove the file to fly them again.")
         if missing:
             hired = workers()
             count = hired.count

@@ -25,8 +25,8 @@ class Journal:
         self._code = code
         self.runs: dict[str, RunResult] = {}
         """By key."""
-        self.from_other_code = 0
-        """Of these, how many were flown by other sources under the same version."""
+        self.from_other_code: set[str] = set()
+        """Keys of those that were flown by other sources under the same version."""
 
     def __enter__(self) -> Journal:
         try:
@@ -74,4 +74,5 @@ class Journal:
                     f"{self.path}, line {number}: is no run of this version: {line[:60].decode(errors='replace')!r}"
                 ) from None
             self.runs[run.key] = run
-            self.from_other_code += code != self._code
+            if code != self._code:
+                self.from_other_code.add(run.key)

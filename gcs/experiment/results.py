@@ -20,6 +20,9 @@ from gcs.statistics import PairedDifference, Share, Spread
 
 POINTS = f"{100 * MARGIN:g} points"
 FILES = ("table.md", "cells.csv", "runs.csv", "experiment.json")
+DOWN = "▼"
+LEFT_OUT = ("runs", "false alarms", "passed where")
+"""On a terminal."""
 OF_SEVERAL_FIGURES = (
     "heading_error_deg",
     "distance_to_target_m",
@@ -68,13 +71,22 @@ class Results:
         (folder / "experiment.json").write_bytes(self.json(orjson.OPT_INDENT_2) + b"\n")
 
     def show(self, console: Any) -> None:
-        """The suites, their conditions pooled."""
-        head = self._head("suite")
-        table = Table(*head, title=self.title, title_justify="left", title_style="bold", box=box.SIMPLE)
-        for before, cell in zip((None, *self.suites), self.suites, strict=False):
-            first = before is None or before.suite != cell.suite
-            table.add_row(*_row(cell.suite if first else "", cell), end_section=False)
+        """The suites, their conditions pooled, in the columns that a terminal has room for."""
+        table = Table(title=self.title, title_justify="left", title_style="bold", box=box.SIMPLE, collapse_padding=True)
+        rows = [_row(cell.suite, cell, DOWN) for cell in self.suites]
+        columns = [place for place, name in enumerate(self._head("suite")) if not name.startswith(LEFT_OUT)]
+        for place in columns:
+            table.add_column(self._head("suite")[place], no_wrap=place > 0)
+        for row in rows:
+            table.add_row(*(row[place] for place in columns if place < len(row)))
         console.print(table)
+        if any(cell.below_reference for cell in self.suites):
+            console.print(f"{DOWN}: {self._below}", highlight=False)
+
+    @property
+    def _below(self) -> str:
+        """What is said of an arm that falls short."""
+        return f"below {self.reference} − {POINTS}"
 
     def _markdown(self) -> Iterator[str]:
         yield f"# {self.title}\n"
@@ -83,10 +95,12 @@ class Results:
             every = [cell for cell in self.cells if cell.suite == suite]
             pooled = [cell for cell in self.suites if cell.suite == suite]
             yield f"## {suite}\n"
-            yield from _table(self._head("condition"), (_row(cell.condition or "", cell) for cell in every))
+            yield from _table(
+                self._head("condition"), (_row(cell.condition or "", cell, self._below) for cell in every)
+            )
             if len({cell.condition for cell in every}) > 1:
                 yield "\nAll conditions pooled:\n"
-                yield from _table(self._head("suite"), (_row(suite, cell) for cell in pooled))
+                yield from _table(self._head("suite"), (_row(suite, cell, self._below) for cell in pooled))
             yield ""
         if self.incomplete:
             yield "## Not completed\n"
@@ -95,16 +109,18 @@ class Results:
             )
 
     def _head(self, first: str) -> tuple[str, ...]:
-        head = (first, "arm", "passed", "heading error", "distance", "found after", "false alarms")
+        head = (first, "arm", "runs", "passed", "heading error", "distance", "found after", "false alarms")
         if self.reference is None:
             return head
         return (*head, f"against {self.reference}", f"passed where {self.reference} did")
 
 
-def _row(name: str, cell: Cell) -> tuple[str, ...]:
+def _row(name: str, cell: Cell, below: str) -> tuple[str, ...]:
+    """below: what is said where the arm falls short of the reference."""
     row = (
         name,
         cell.arm,
+        f"{cell.passed.n}",
         _share(cell.passed),
         _spread(cell.heading_error_deg, "°"),
         _spread(cell.distance_to_target_m, " m"),
@@ -115,15 +131,15 @@ def _row(name: str, cell: Cell) -> tuple[str, ...]:
         return row
     return (
         *row,
-        _difference(cell.against_reference, below=cell.below_reference),
-        _share(cell.passed_where_reference_did),
+        _difference(cell.against_reference) + (f", {below}" if cell.below_reference else ""),
+        f"{_share(cell.passed_where_reference_did)} of {cell.passed_where_reference_did.n}",
     )
 
 
 def _share(share: Share) -> str:
     if share.n == 0:
         return "–"
-    return f"{share.count}/{share.n} = {100 * share.rate:.0f} % [{100 * share.low:.0f}, {100 * share.high:.0f}]"
+    return f"{100 * share.rate:.0f} % [{100 * share.low:.0f}, {100 * share.high:.0f}]"
 
 
 def _spread(spread: Spread | None, unit: str) -> str:
@@ -140,13 +156,13 @@ def _found(cell: Cell) -> str:
     return f"{median} ({cell.detected.count}/{cell.detected.n})"
 
 
-def _difference(difference: PairedDifference | None, *, below: bool) -> str:
+def _difference(difference: PairedDifference | None) -> str:
     if difference is None:
         return "–"
-    percent = [
-        f"{100 * value:+.0f}".replace("-", "−") for value in (difference.difference, difference.low, difference.high)
-    ]
-    return f"{percent[0]} [{percent[1]}, {percent[2]}]" + (f", below by more than {POINTS}" if below else "")
+    mean, low, high = (
+        f"{100 * share:+.0f}".replace("-", "−") for share in (difference.difference, difference.low, difference.high)
+    )
+    return f"{mean} [{low}, {high}]"
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> Iterator[str]:

@@ -113,6 +113,8 @@ def fly_run(task: Task) -> RunResult:
     try:
         trial = attempt(task.scenario, seed=task.seed, ratings=spoken(task))
     except Exception as error:
+        if isinstance(error.__cause__, KeyboardInterrupt):  # inside JSBSim, Ctrl-C comes out as a SystemError
+            raise error.__cause__ from None
         at = traceback.extract_tb(error.__traceback__)[-1]
         trial = Trial(None, f"{type(error).__name__}: {error} ({Path(at.filename).name}:{at.lineno})")
         crashed = True

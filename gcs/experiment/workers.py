@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
+from itertools import islice
 from typing import Any, Protocol, TypeVar
 
 from joblib import Parallel, delayed, effective_n_jobs
@@ -17,6 +19,11 @@ R = TypeVar("R")
 
 CONNECT_S = 5.0
 """A scheduler that has not answered by then is not there."""
+
+AT_ONCE = 1000
+"""Tasks that a scheduler is handed: enough for any cluster, and no more than it likes to hold."""
+IDLE_S = 20
+"""Processes with nothing to do leave after this, even if whoever started them was killed."""
 
 
 class WorkersLost(RuntimeError):
@@ -58,6 +65,7 @@ class Local:
             return_as="generator_unordered",
             batch_size=1,  # a result is kept when it is there, not when its batch is
             inner_max_num_threads=1,
+            idle_worker_timeout=IDLE_S,
         )
         try:
             yield from parallel(delayed(function)(task) for task in tasks)
@@ -76,6 +84,8 @@ class Cluster:
             import distributed
         except ModuleNotFoundError as error:
             raise NoCluster(f"--dask needs {error.name}, which is not installed: pip install 'trustr[dask]'") from None
+        for name in ("distributed", "distributed.client"):  # what it would say with a traceback, we say in a sentence
+            logging.getLogger(name).setLevel(logging.CRITICAL)
         try:
             asyncio.run(_reach(address))
         except Exception as error:  # a server of another kind may answer anything
@@ -104,15 +114,19 @@ class Cluster:
         """As `Workers`."""
         import distributed
 
-        futures = self._client.map(function, tasks, pure=False)
+        waiting = iter(tasks)
+        futures = self._client.map(function, list(islice(waiting, AT_ONCE)), pure=False)
+        done = distributed.as_completed(futures, loop=self._client.loop)
+        del futures  # the cluster forgets a result when nobody here holds it
         try:
-            for future in distributed.as_completed(futures):
+            for future in done:
+                for task in islice(waiting, 1):
+                    done.add(self._client.submit(function, task, pure=False))
                 yield future.result()
-                future.release()  # the scheduler need not hold what is kept here
         except (OSError, RuntimeError, distributed.CancelledError, distributed.KilledWorker) as error:
             raise WorkersLost(f"the Dask cluster is gone, or lost a flight: {_first_line(error)}") from None
         finally:
-            self._client.cancel(futures)
+            self._client.cancel(list(done.futures))
 
     def close(self) -> None:
         """Leave the cluster as it was."""
