@@ -221,7 +221,7 @@ class Trust(Section):
     @model_validator(mode="after")
     def _both_bounds(self) -> Trust:
         if (self.response_acceleration_m_s2 is None) != (self.response_jerk_m_s3 is None):
-            raise ValueError("response_acceleration_m_s2 and response_jerk_m_s3: both bounds of the response, or neither")
+            raise ValueError("response_acceleration_m_s2 and response_jerk_m_s3: it takes both bounds, or neither")
         return self
 
 

@@ -2,7 +2,8 @@
 
 Three residuals are watched, and at each tick the one that accuses most counts:
 
-* response: measured velocity less what a healthy robot would make of the commands it was sent (`response.py`);
+* response: measured velocity less what a healthy robot would make of the commands it was sent (`response.py`), and
+  less what nearly all robots share, a gust for instance;
 * consistency: measured position less where the robot's own reported velocities take it;
 * disagreement: measured velocity less the median of the trusted robots in its neighbourhood.
 
@@ -39,10 +40,14 @@ SMOOTHING_S = 0.3
 """Low pass of the residuals."""
 NOISE_MEMORY_S = 1.0
 """Low pass of the estimated variance of telemetry noise."""
+UNREST_MEMORY_S = 2.0
+"""Low pass of the variance that most robots show."""
 PLACE_MEMORY_S = 1.0
 """How long positions are predicted from reported velocities before they are believed."""
 WILDEST = 3.0
 """m/s and m: no single residual counts for more, so that one wild message is not ten."""
+ENOUGH_TO_SHARE = 3
+"""Robots."""
 TRUSTED = 0.5
 MEDIAN_CHI2 = 2.0 * math.log(2.0)
 """Median of χ² with two degrees of freedom: the squared length of a standard normal vector in the plane."""
@@ -87,6 +92,8 @@ class Evidence:
     """m²/s²: variance of the white noise of reported velocities, an axis."""
     place_noise: float
     """m²: the same of reported positions."""
+    unrest: float
+    """m²/s²: variance of the smoothed response residual of most robots, an axis: gusts, or a model that is off."""
     log_odds: Array
     """(N,) of being faulty."""
 
@@ -105,6 +112,7 @@ class Evidence:
             disagreement_ne=nothing,
             velocity_noise=watch.tolerance**2,
             place_noise=watch.place_tolerance**2,
+            unrest=0.0,
             log_odds=np.full(len(velocity_ne), PRIOR),
         )
 
@@ -130,7 +138,8 @@ def weigh(
     smooth, remember = _share(SMOOTHING_S, watch.dt), _share(NOISE_MEMORY_S, watch.dt)
 
     raw = _update(evidence.raw_ne, capped(velocity_ne - expected.velocity_ne, WILDEST), told)
-    residual = _update(evidence.residual_ne, evidence.residual_ne + smooth * (raw - evidence.residual_ne), told)
+    own = raw - shared(raw, told)
+    residual = _update(evidence.residual_ne, evidence.residual_ne + smooth * (own - evidence.residual_ne), told)
     velocity_noise = _noise(evidence.velocity_noise, raw - evidence.raw_ne, told, remember)
 
     predicted = np.where(told[:, None], evidence.predicted_ne + watch.dt * velocity_ne, position_ne)
@@ -150,6 +159,7 @@ def weigh(
         inconsistency_ne=_update(evidence.inconsistency_ne, inconsistency, told),
         velocity_noise=velocity_noise,
         place_noise=place_noise,
+        unrest=evidence.unrest + _share(UNREST_MEMORY_S, watch.dt) * (_unrest(residual, told) - evidence.unrest),
     )
     return watched if graph is None else _judge(watched, watch, velocity_ne, told, graph)
 
@@ -167,6 +177,21 @@ def _judge(evidence: Evidence, watch: Watch, velocity_ne: Array, told: Flags, gr
     change = np.clip(worst * worth, -FOR * worth, AGAINST * worth)
     log_odds = np.clip(evidence.log_odds + np.where(told, change, 0.0), LOWEST, HIGHEST)
     return replace(judged, log_odds=log_odds)
+
+
+def shared(raw_ne: Array, told: Flags) -> Array:
+    """What nearly all residuals (N, 2) have in common, (2,): the doing of the air, or of the model, and nobody's fault.
+
+    Axis by axis, with a third of the robots left aside at either end, it is the residual closest to zero, and nothing
+    where those between differ in sign: so no third of the swarm can put its fault upon the others. Of fewer than three
+    robots nothing can be said.
+    """
+    count = int(np.count_nonzero(told))
+    if count < ENOUGH_TO_SHARE:
+        return np.zeros(2)
+    ordered = np.sort(raw_ne[told], axis=0)
+    low, high = ordered[(count - 1) // 3], ordered[-1 - (count - 1) // 3]
+    return np.maximum(low, 0.0) + np.minimum(high, 0.0)
 
 
 def neighbourhood(graph: Graph, velocity_ne: Array, trusted: Flags) -> Array:
@@ -200,9 +225,10 @@ def accusations(evidence: Evidence, watch: Watch) -> tuple[Array, Array, Array]:
 def spreads(evidence: Evidence, watch: Watch) -> tuple[float, float, float]:
     """σ² of a healthy robot's response, consistency and disagreement residuals, an axis, telemetry's noise included."""
     passed = _passed(SMOOTHING_S, watch.dt)
+    restless = max(passed * evidence.velocity_noise, evidence.unrest)
     walked = evidence.velocity_noise * watch.dt**2 / (2.0 * _share(PLACE_MEMORY_S, watch.dt))
     return (
-        watch.tolerance**2 + passed * evidence.velocity_noise,
+        watch.tolerance**2 + restless,
         watch.place_tolerance**2 + passed * evidence.place_noise + walked,
         watch.disagreement**2 + passed * evidence.velocity_noise,
     )
@@ -233,6 +259,19 @@ def _noise(before: float, step: Array, told: Flags, remember: float) -> float:
         return before
     variance = float(np.median(np.einsum("ij,ij->i", step, step)[told])) / (2.0 * MEDIAN_CHI2)
     return before + remember * (variance - before)
+
+
+def _unrest(residual_ne: Array, told: Flags) -> float:
+    """Variance of residuals (N, 2), an axis, by the lower median of their squared lengths: half the swarm may fail.
+
+    Of n such lengths of normal vectors the k-th smallest is 2σ² (1/n + 1/(n−1) + … + 1/(n−k+1)) in the mean.
+    """
+    lengths = np.sort(np.einsum("ij,ij->i", residual_ne, residual_ne)[told])
+    count = len(lengths)
+    if count < ENOUGH_TO_SHARE:
+        return 0.0
+    rank = (count + 1) // 2
+    return float(lengths[rank - 1]) / (2.0 * sum(1.0 / (count - below) for below in range(rank)))
 
 
 def _share(time_s: float, dt: float) -> float:

@@ -85,9 +85,17 @@ def _best(samples: Sequence[Sample], dt: float) -> tuple[Response, Array]:
 
     free = [least_squares(errors, start, bounds=(0.0, LONGEST_S), diff_step=1e-3) for start in STARTS]
     without = min(free, key=lambda fit: float(fit.cost))
+    if np.mean(without.fun**2) * WORTH_IT < _white(samples, Response(*map(float, without.x)), dt):
+        return Response(*map(float, without.x)), np.asarray(without.fun)
     with_bounds = least_squares(errors, BOUNDED_START, bounds=(LEAST, MOST), diff_step=1e-2, x_scale=BOUNDED_START)
     best = with_bounds if with_bounds.cost < WORTH_IT * without.cost else without
     return Response(*map(float, best.x)), np.asarray(best.fun)
+
+
+def _white(samples: Sequence[Sample], response: Response, dt: float) -> float:
+    """m²/s²: the part of what is unexplained that changes from tick to tick, which no response explains."""
+    steps = np.concatenate([np.diff(_unexplained(sample, response, dt), axis=0).ravel() for sample in samples])
+    return 0.5 * float(np.mean(steps**2))
 
 
 def _unexplained(sample: Sample, response: Response, dt: float) -> Array:
