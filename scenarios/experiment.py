@@ -207,7 +207,7 @@ def load_experiment(name_or_path: str | Path) -> Experiment:
     return parse_experiment(text, source=path.name, folder=path.parent)
 
 
-def parse_experiment(text: str, *, source: str, folder: Path) -> Experiment:
+def parse_experiment(text: str, *, source: str, folder: Path = Path()) -> Experiment:
     """Build an experiment from the text of a TOML file; `folder` is where its paths begin. Raises ScenarioError."""
     try:
         tables = tomllib.loads(text)

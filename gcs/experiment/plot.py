@@ -26,6 +26,10 @@ MOST_ROWS = 30
 """Conditions that get a row each; of more than that, a suite gets one."""
 ROW, PANEL, LETTER = 0.2, 0.95, 0.065
 """Inches: height of a row, widths of a panel and of a letter in the names beside the first."""
+LEAST = 1e-3
+"""Where a logarithmic axis begins at the latest; it has no zero."""
+NARROWEST = 12.0
+"""Ratio of a logarithmic axis's ends, at least: so that it has two ticks."""
 DPI = 200
 PASS_RATE, ERRORS = "pass_rate.png", "errors.png"
 
@@ -80,7 +84,7 @@ def _picture(results: Results, shown: Sequence[Cell], bands: Sequence[Figure], p
     rows = _rows(shown)
     names = 0.3 + LETTER * max(len(condition or suite) for suite, condition in rows)
     size = max(names + PANEL * len(arms), 6.0), len(bands) * (ROW * (len(rows) + 1) + 0.75) + 0.9
-    figure, axes = plt.subplots(len(bands), len(arms), figsize=size, squeeze=False, layout="constrained")
+    figure, axes = plt.subplots(len(bands), len(arms), figsize=size, dpi=DPI, squeeze=False, layout="constrained")
     for band, line in zip(bands, axes, strict=True):
         marks = [mark for cell in shown if (mark := band.of(cell)) is not None]
         for arm, panel in zip(arms, line, strict=True):
@@ -90,7 +94,7 @@ def _picture(results: Results, shown: Sequence[Cell], bands: Sequence[Figure], p
         line[len(arms) // 2].set_xlabel(band.label)
     figure.suptitle(fill(results.title, int(13 * size[0])), fontsize=9)
     figure.legend(handles=_legend(results), loc="outside lower center", ncols=3, frameon=False)
-    figure.savefig(path, dpi=DPI)
+    figure.savefig(path)
     plt.close(figure)
 
 
@@ -129,7 +133,9 @@ def _lay_out(panel: Any, band: Figure, marks: Sequence[Mark], rows: dict[Row, in
     panel.set_axisbelow(True)
     if band.logarithmic and marks:
         panel.set_xscale("log")
-        panel.set_xlim(0.7 * min(mark.at for mark in marks), 1.3 * max(mark.high for mark in marks))
+        low, high = max(0.7 * min(mark.at for mark in marks), LEAST), 1.3 * max(mark.high for mark in marks)
+        wider = max(1.0, math.sqrt(NARROWEST / (high / low)))
+        panel.set_xlim(low / wider, high * wider)
         panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0), numticks=9))
         panel.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         panel.xaxis.set_minor_locator(NullLocator())

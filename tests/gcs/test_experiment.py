@@ -1,0 +1,612 @@
+"""`gcs experiment`: flown once and kept, the same on any workers, broken off and gone on with, judged in pairs."""
+
+import csv
+import fcntl
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import contextmanager
+from dataclasses import replace
+from io import StringIO
+from itertools import pairwise
+from math import isnan
+
+import matplotlib.pyplot as plt
+import orjson
+import pytest
+from flights import GCS
+from rich.console import Console
+
+from gcs import cli
+from gcs.experiment import meter, run
+from gcs.experiment.cells import cells, suites
+from gcs.experiment.conduct import Conducted, Timing
+from gcs.experiment.plot import MOST_ROWS, draw
+from gcs.experiment.results import Results
+from gcs.experiment.run import RunResult, fly_run, tasks
+from gcs.flight import Flight
+from gcs.lockstep import Lockstep
+from gcs.loop import fly
+from gcs.scoring import score
+from gcs.track import Tracker
+from gcs.trial import attempt
+from gcs.truth import Truth
+from scenarios import load
+from scenarios.experiment import load_experiment, parse_experiment
+
+SHORT = """
+title = "Short"
+seeds = 2
+reference = "truth"
+scenarios = ["transit"]
+set = ["mission.leg.0.length_m=3", "mission.leg.1.length_m=4.5", "mission.run_up_s=1"]
+
+[[suite]]
+name = "base"
+severities = [0.4]
+
+[[suite]]
+name = "fault-free"
+no_fault = true
+
+[[arm]]
+name = "average"
+controller = "average"
+
+[[arm]]
+name = "truth"
+controller = "trust-r"
+trust = "truth"
+"""
+RUNS = 8
+FILES = {"runs.jsonl", "runs.csv", "cells.csv", "table.md", "experiment.json", "pass_rate.png", "errors.png"}
+
+
+@pytest.fixture
+def short(tmp_path):
+    path = tmp_path / "short.toml"
+    path.write_text(SHORT, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    """The short experiment, flown once by `gcs` on two processes: (file, folder, what it said, stderr)."""
+    folder = tmp_path_factory.mktemp("flown")
+    path = folder / "short.toml"
+    path.write_text(SHORT, encoding="utf-8")
+    done = command(path, "--jobs", 2, "--out", folder / "out", "--json")
+    assert done.returncode == 0, done.stderr
+    return path, folder / "out", orjson.loads(done.stdout), done.stderr
+
+
+@pytest.fixture
+def gcs(capfd):
+    """Run `gcs` with these words in this process: (exit code, stdout, stderr)."""
+
+    def experiment(*words):
+        with pytest.raises(SystemExit) as ended:
+            cli.main(["experiment", *(str(word) for word in words)])
+        return ended.value.code or 0, *capfd.readouterr()
+
+    return experiment
+
+
+def command(*words):
+    words = [str(word) for word in (GCS, "experiment", *words)]
+    return subprocess.run(words, capture_output=True, text=True, check=False, timeout=120)
+
+
+def one_sentence(words):
+    return words.count("\n") == 1 and words.startswith("gcs: ")
+
+
+def results(said):
+    """Of an object of JSON, what must not depend on who flew it."""
+    return {key: said[key] for key in ("title", "seeds", "reference", "cells", "suites", "incomplete")}
+
+
+def lines(folder):
+    path = folder / "runs.jsonl"
+    return path.read_bytes().splitlines() if path.exists() else []
+
+
+# What is flown
+
+
+def test_a_trial_scores_what_a_whole_flight_scores():
+    scenario = load("emergency")
+    flight = Flight(scenario)
+    truth = Truth(flight.ids)
+    tracker = Tracker(flight, truth)
+    world = Lockstep.of(scenario, seed=3)
+    state = fly(world, world, flight, (truth, tracker), period_ns=scenario.time.period_ns)
+    assert state.problem is None
+    assert attempt(scenario, seed=3).score == score(tracker.track, scenario)
+
+
+def test_every_arm_flies_every_condition_with_the_same_seeds_all_arms_of_a_seed_before_the_next():
+    every = tasks(load_experiment("base"), seeds=3)
+    assert len(every) == 6 * 9 * 3
+    assert [task.seed for task in every] == sorted(task.seed for task in every)
+    for arm in {task.arm for task in every}:
+        mine = [(task.suite, task.condition, task.seed) for task in every if task.arm == arm]
+        assert len(mine) == len(set(mine)) == 6 * 3
+
+
+def test_a_key_is_the_flights_and_not_its_names():
+    def keys(text):
+        return [task.key for task in tasks(parse_experiment(text, source="x"), seeds=2)]
+
+    renamed = SHORT.replace('"base"', '"first"').replace('name = "average"', 'name = "eq. 1"')
+    assert keys(SHORT) == keys(renamed)
+    assert len(set(keys(SHORT))) == RUNS
+    assert not set(keys(SHORT)) & set(keys(SHORT.replace("m=3", "m=3.1")))
+    fused = SHORT.replace('trust = "truth"', 'trust = "ratings"\nratings = "realistic"')
+    assert not set(keys(fused)[1::2]) & set(keys(fused.replace("realistic", "lazy"))[1::2])
+
+
+def test_an_unknown_model_of_raters_is_refused_with_those_there_are(gcs, short):
+    short.write_text(SHORT + 'ratings = "psychic"\n', encoding="utf-8")
+    code, _, err = gcs(short)
+    assert code == 2
+    assert "arm truth: ratings = 'psychic': allowed are " in err
+    assert "realistic" in err
+
+
+# What comes out
+
+
+def test_all_that_an_experiment_leaves_says_the_same(flown):
+    _, folder, said, err = flown
+    assert {path.name for path in folder.iterdir()} == FILES
+    assert said == orjson.loads((folder / "experiment.json").read_bytes())
+    assert len(lines(folder)) == RUNS
+    with (folder / "runs.csv").open(encoding="utf-8") as stream:
+        runs = list(csv.DictReader(stream))
+    assert {(r["suite"], r["arm"], r["seed"]) for r in runs} == {
+        (suite, arm, seed) for suite in ("base", "fault-free") for arm in ("average", "truth") for seed in "12"
+    }
+    with (folder / "cells.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [float(row["passed_rate"]) for row in rows] == [cell["passed"]["rate"] for cell in said["cells"]]
+    table = (folder / "table.md").read_text(encoding="utf-8")
+    for cell in said["cells"]:
+        assert f"{cell['heading_error_deg']['mean']:.2f} ± {cell['heading_error_deg']['ci95']:.2f}°" in table
+    assert "nan" not in table
+    assert said["timing"]["flown"] == RUNS
+    assert said["timing"]["workers"] == 2
+    assert f"{said['timing']['runs_per_hour']:.0f} runs/h, workers: 2" in err
+    assert f"{RUNS} of {RUNS} runs" in err
+
+
+def test_a_run_is_what_the_flight_scores(flown):
+    _, folder, *_ = flown
+    task = tasks(parse_experiment(SHORT, source="x"), seeds=1)[1]
+    expected = attempt(task.scenario, seed=1).score
+    kept = next(r for r, _ in map(RunResult.of_line, lines(folder)) if r.key == task.key)
+    assert (kept.heading_error_deg, kept.distance_to_target_m) == (
+        expected.heading_error_deg,
+        expected.distance_to_target_m,
+    )
+    assert (kept.passed, kept.detected, kept.faulty) == (expected.passed, {5: 0.0}, 1)
+
+
+def test_pictures_are_pictures(flown):
+    for name in ("pass_rate.png", "errors.png"):
+        assert plt.imread(flown[1] / name).shape[0] > 200
+
+
+def test_without_json_a_table_is_shown_and_the_files_are_named(gcs, flown):
+    path, folder, *_ = flown
+    code, out, err = gcs(path, "--out", folder)
+    assert code == 0
+    assert "Short" in out
+    assert "fault-free" in out
+    assert all(str(folder / name) in err.replace("\n", "") for name in FILES - {"runs.jsonl"})
+
+
+# Flown once
+
+
+def test_the_same_command_again_flies_nothing_and_says_the_same(flown):
+    path, folder, said, _ = flown
+    before = (folder / "runs.jsonl").read_bytes()
+    again = command(path, "--out", folder, "--json")
+    assert results(orjson.loads(again.stdout)) == results(said)
+    assert orjson.loads(again.stdout)["timing"] | {"wall_s": 0} == {
+        "flown": 0, "kept": RUNS, "workers": 0, "wall_s": 0, "runs_per_hour": None,
+    }  # fmt: skip
+    assert (folder / "runs.jsonl").read_bytes() == before
+
+
+@contextmanager
+def copy_of(flown, tmp_path, *, runs):
+    """A folder with the first of the runs."""
+    folder = tmp_path / "copy"
+    folder.mkdir()
+    (folder / "runs.jsonl").write_bytes(b"".join(line + b"\n" for line in lines(flown[1])[:runs]))
+    yield folder
+
+
+def test_what_a_killed_process_left_half_written_is_flown_again(gcs, flown, tmp_path):
+    path, original, said, _ = flown
+    with copy_of(flown, tmp_path, runs=RUNS - 1) as folder:
+        with (folder / "runs.jsonl").open("ab") as stream:
+            stream.write(lines(original)[-1][:40])
+        code, out, _ = gcs(path, "--jobs", 1, "--out", folder, "--json")
+        assert code == 0
+        assert orjson.loads(out)["timing"]["flown"] == 1
+        assert results(orjson.loads(out)) == results(said)
+        assert len(lines(folder)) == RUNS
+
+
+def test_more_seeds_fly_only_what_is_new(gcs, flown, tmp_path):
+    with copy_of(flown, tmp_path, runs=RUNS) as folder:
+        code, out, _ = gcs(flown[0], "--seeds", 3, "--only", "fault-free", "--jobs", 1, "--out", folder, "--json")
+        assert code == 0
+        assert orjson.loads(out)["timing"] | {"wall_s": 0, "runs_per_hour": 0} == {
+            "flown": 2, "kept": 4, "workers": 1, "wall_s": 0, "runs_per_hour": 0,
+        }  # fmt: skip
+        assert {cell["suite"] for cell in orjson.loads(out)["cells"]} == {"fault-free"}
+
+
+def test_flights_that_are_the_same_under_two_names_are_flown_once(gcs, flown, tmp_path):
+    path = tmp_path / "twice.toml"
+    path.write_text(SHORT + '[[suite]]\nname = "again"\nno_fault = true\n', encoding="utf-8")
+    with copy_of(flown, tmp_path, runs=RUNS) as folder:
+        code, out, _ = gcs(path, "--out", folder, "--json")
+        assert code == 0
+        said = orjson.loads(out)
+        assert said["timing"]["flown"] == 0
+        free, again = ([c | {"suite": ""} for c in said["suites"] if c["suite"] == s] for s in ("fault-free", "again"))
+        assert free == again
+
+
+def test_runs_of_other_sources_under_the_same_version_count_but_are_told(gcs, flown, tmp_path):
+    with copy_of(flown, tmp_path, runs=RUNS) as folder:
+        journal = folder / "runs.jsonl"
+        digest = run.code_digest().encode()
+        journal.write_bytes(journal.read_bytes().replace(digest, b"0" * len(digest)))
+        code, _, err = gcs(flown[0], "--out", folder, "--json")
+        assert code == 0
+        assert f"{RUNS} runs were flown by other sources than these" in err
+
+
+def test_a_journal_that_holds_something_else_is_refused(gcs, short, tmp_path):
+    (tmp_path / "runs.jsonl").write_text('{"my": "notes"}\n', encoding="utf-8")
+    code, out, err = gcs(short, "--out", tmp_path)
+    assert (code, out) == (2, "")
+    assert one_sentence(err)
+    assert "runs.jsonl, line 1" in err
+    assert (tmp_path / "runs.jsonl").read_text(encoding="utf-8") == '{"my": "notes"}\n'
+
+
+def test_two_experiments_do_not_write_into_one_folder(gcs, short, tmp_path):
+    with (tmp_path / "runs.jsonl").open("ab") as stream:
+        fcntl.flock(stream, fcntl.LOCK_EX)
+        code, _, err = gcs(short, "--out", tmp_path)
+    assert code == 2
+    assert one_sentence(err)
+    assert "another experiment is writing there" in err
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_broken_off_it_keeps_what_is_flown_and_goes_on_from_there(flown, tmp_path, jobs, how):
+    path, _, said, _ = flown
+    words = [str(GCS), "experiment", str(path), "--out", str(tmp_path), "--jobs", str(jobs), "--json"]
+    with (tmp_path / "stderr").open("wb") as stderr:
+        started = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=stderr, start_new_session=True)
+        while len(lines(tmp_path)) < 2 and started.poll() is None:
+            time.sleep(0.02)
+        os.killpg(started.pid, how)
+        code = started.wait(timeout=30)
+    left = len(lines(tmp_path))
+    assert 2 <= left < RUNS
+    if how == signal.SIGINT:
+        assert code == 130
+        assert "the same command goes on from there" in (tmp_path / "stderr").read_text()
+    again = subprocess.run(words, capture_output=True, check=True)
+    assert orjson.loads(again.stdout)["timing"]["kept"] >= left - (how == signal.SIGKILL)
+    assert results(orjson.loads(again.stdout)) == results(said)
+
+
+# Whoever flies
+
+
+def test_one_process_flies_what_two_fly(gcs, flown, tmp_path):
+    code, out, _ = gcs(flown[0], "--jobs", 1, "--out", tmp_path / "out", "--json")
+    assert code == 0
+    assert results(orjson.loads(out)) == results(flown[2])
+
+
+CLUSTER = """
+import sys
+from distributed import LocalCluster
+with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as cluster:
+    print(cluster.scheduler_address, flush=True)
+    sys.stdin.read()
+"""
+
+
+@contextmanager
+def cluster():
+    started = subprocess.Popen(
+        [sys.executable, "-c", CLUSTER],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    try:
+        yield started.stdout.readline().strip()
+    finally:
+        started.communicate(timeout=60)
+
+
+def test_a_dask_cluster_flies_what_this_machine_flies(flown, tmp_path):
+    with cluster() as address:
+        done = command(flown[0], "--dask", address, "--out", tmp_path / "out", "--json")
+    assert done.returncode == 0, done.stderr
+    said = orjson.loads(done.stdout)
+    assert results(said) == results(flown[2])
+    assert (said["timing"]["workers"], said["timing"]["flown"]) == (2, RUNS)
+
+
+@contextmanager
+def server_of_another_kind():
+    """Answers everything as the web does, and closes."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def serve():
+            while True:
+                try:
+                    client, _ = server.accept()
+                except OSError:
+                    return
+                with client:
+                    client.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n")
+
+        threading.Thread(target=serve, daemon=True).start()
+        yield f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        server.shutdown(socket.SHUT_RDWR)
+
+
+def test_no_cluster_is_told_in_one_sentence_without_a_long_wait(short, tmp_path):
+    with server_of_another_kind() as other:
+        for address in ("tcp://127.0.0.1:1", "tcp://127.0.0.1", "nonsense", "ftp://127.0.0.1:1", other):
+            began = time.monotonic()
+            done = command(short, "--dask", address, "--out", tmp_path / "out")
+            assert done.returncode == 2
+            assert one_sentence(done.stderr), done.stderr
+            assert f"--dask {address}: no scheduler answers there" in done.stderr
+            assert time.monotonic() - began < 15
+
+
+def test_without_dask_installed_the_sentence_says_how_to_get_it(gcs, short, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    code, _, err = gcs(short, "--dask", "tcp://127.0.0.1:1", "--out", tmp_path)
+    assert code == 2
+    assert one_sentence(err)
+    assert "pip install 'trustr[dask]'" in err
+
+
+# What goes wrong
+
+
+def test_a_flight_that_cannot_be_completed_has_not_passed_is_listed_and_stops_nothing(gcs, short, tmp_path):
+    short.write_text(SHORT.replace("set = [", 'set = ["time.timeout_s=3", '), encoding="utf-8")
+    code, out, err = gcs(short, "--seeds", 1, "--jobs", 1, "--out", tmp_path, "--json")
+    assert code == 0
+    said = orjson.loads(out)
+    assert len(said["incomplete"]) == len(said["cells"]) == 4
+    assert "took longer than time.timeout_s" in said["incomplete"][0]["problem"]
+    cell = said["cells"][0]
+    assert (cell["passed"]["count"], cell["passed"]["n"], cell["incomplete"], cell["heading_error_deg"]) == (
+        0,
+        1,
+        1,
+        None,
+    )
+    assert "not completed: base, transit 40 %, average, seed 1: the flight took longer" in err
+    table = (tmp_path / "table.md").read_text(encoding="utf-8")
+    assert table.count("took longer than time.timeout_s") == 4
+    assert gcs(short, "--seeds", 1, "--out", tmp_path, "--json")[0] == 0
+
+
+def test_an_error_of_the_program_is_no_result_and_is_flown_again(gcs, short, tmp_path, monkeypatch):
+    real = run.attempt
+
+    def attempt_with_a_defect(scenario, *, seed, ratings):
+        if scenario.control.rule == "average":
+            raise ZeroDivisionError("by nothing")
+        return real(scenario, seed=seed, ratings=ratings)
+
+    monkeypatch.setattr(run, "attempt", attempt_with_a_defect)
+    code, out, err = gcs(short, "--seeds", 1, "--jobs", 1, "--out", tmp_path, "--json")
+    assert code == 3
+    assert "ZeroDivisionError: by nothing (test_experiment.py:" in orjson.loads(out)["incomplete"][0]["problem"]
+    assert "2 runs ended in an error of this program" in err
+    assert len(lines(tmp_path)) == 2
+    monkeypatch.undo()
+    code, out, _ = gcs(short, "--seeds", 1, "--jobs", 1, "--out", tmp_path, "--json")
+    assert code == 0
+    assert (orjson.loads(out)["timing"]["flown"], orjson.loads(out)["incomplete"]) == (2, [])
+
+
+def test_ctrl_c_inside_jsbsim_is_still_ctrl_c(monkeypatch):
+    def interrupted(*_, **__):
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    monkeypatch.setattr(run, "attempt", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        fly_run(tasks(parse_experiment(SHORT, source="x"), seeds=1)[0])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("nope",), "no experiment 'nope'"),
+        (("base", "--seeds", "0"), "--seeds 0: must be at least 1"),
+        (("base", "--jobs", "0"), "--jobs 0: must be a number of processes"),
+        (("base", "--only", "bse"), "--only bse: there is no such suite or condition; there are base/transit 40 %"),
+        (("base", "--out", "/dev/null/x"), "--out /dev/null/x: cannot be written"),
+    ],
+)
+def test_a_wrong_word_is_one_sentence(gcs, words, said):
+    code, out, err = gcs(*words)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert one_sentence(err)
+
+
+# What the runs amount to
+
+
+def made(arm, passes, *, suite="s", condition="c", **changes):
+    """Runs with seeds from 1."""
+    one = RunResult(
+        key="", suite=suite, condition=condition, arm=arm, seed=0, passed=False, heading_error_deg=1.0,
+        distance_to_target_m=2.0, min_separation_m=1.5, faulty=0, detected={}, false_alarms=0, problem=None,
+        crashed=False, wall_s=1.0, cpu_s=1.0,
+    )  # fmt: skip
+    return [replace(one, seed=seed, passed=bool(passed), **changes) for seed, passed in enumerate(passes, start=1)]
+
+
+def by_arm(found):
+    return {cell.arm: cell for cell in found}
+
+
+def test_pairs_are_of_one_condition_and_seed():
+    """Both pass half of the time: never together in condition c, always together in d."""
+    runs = [
+        *made("truth", [1, 1, 0, 0]), *made("auto", [0, 0, 1, 1]),
+        *made("truth", [1, 0, 1, 0], condition="d"), *made("auto", [1, 0, 1, 0], condition="d"),
+    ]  # fmt: skip
+    apart, together = (cell.against_reference for cell in cells(runs, reference="truth") if cell.arm == "auto")
+    assert (apart.won, apart.lost, apart.pairs) == (2, 2, 4)
+    assert (together.won, together.lost, together.pairs) == (0, 0, 4)
+    (pooled,) = (cell for cell in suites(runs, reference="truth") if cell.arm == "auto")
+    assert (pooled.condition, pooled.passed.count, pooled.passed.n) == (None, 4, 8)
+    assert (pooled.against_reference.won, pooled.against_reference.lost, pooled.against_reference.pairs) == (2, 2, 8)
+    where = pooled.passed_where_reference_did
+    assert (where.count, where.n) == (2, 4)
+
+
+def test_below_the_reference_is_a_whole_interval_below_it_by_more_than_five_points():
+    truth = made("truth", [1] * 30)
+    few, many = made("few", [0] * 6 + [1] * 24), made("many", [0] * 9 + [1] * 21)
+    found = by_arm(cells([*truth, *few, *many], reference="truth"))
+    assert found["few"].against_reference.high > -0.05
+    assert not found["few"].below_reference
+    assert found["many"].against_reference.high < -0.05
+    assert found["many"].below_reference
+    assert found["truth"].against_reference is None
+    assert not found["truth"].below_reference
+    assert found["truth"].passed_where_reference_did.rate == 1
+
+
+def test_without_the_reference_there_is_nothing_to_compare():
+    runs = [*made("truth", [1], suite="a"), *made("auto", [1], suite="a"), *made("auto", [1], suite="b")]
+    first, second = (cell for cell in suites(runs, reference="truth") if cell.arm == "auto")
+    assert first.against_reference is not None
+    assert second.against_reference is None
+    assert second.passed_where_reference_did is None
+    assert all(cell.against_reference is None for cell in suites(runs, reference=None))
+
+
+def test_the_median_detection_counts_who_was_never_found():
+    found = made("a", [1] * 3, faulty=1, detected={5: 2.0}) + made("a", [0] * 2, faulty=1)
+    (cell,) = cells(found, reference=None)
+    assert (cell.detection_s, cell.detected.count, cell.detected.n) == (2.0, 3, 5)
+    (cell,) = cells(found + made("a", [0] * 2, faulty=1), reference=None)
+    assert (cell.detection_s, cell.detected.count, cell.detected.n) == (None, 3, 7)
+    (cell,) = cells(made("a", [1]), reference=None)
+    assert (cell.detection_s, cell.detected) == (None, None)
+
+
+def test_means_are_over_the_flights_that_came_to_their_read_out_and_passes_over_all():
+    lost = made("a", [0], heading_error_deg=None, distance_to_target_m=None, min_separation_m=None, problem="lost")
+    (cell,) = cells([*made("a", [1, 1]), *lost], reference=None)
+    assert (cell.passed.count, cell.passed.n, cell.incomplete) == (2, 3, 1)
+    assert (cell.heading_error_deg.mean, cell.heading_error_deg.ci95, cell.min_separation_m) == (1.0, 0.0, 1.5)
+    (cell,) = cells(lost, reference=None)
+    assert (cell.heading_error_deg, cell.min_separation_m) == (None, None)
+
+
+def test_rules_that_use_no_trust_find_nobody_and_alarm_nobody():
+    every = tasks(parse_experiment(SHORT, source="x"), seeds=1)
+    averaged = fly_run(every[0])
+    assert averaged.arm == "average"
+    assert (averaged.faulty, averaged.detected, averaged.false_alarms) == (0, {}, 0)
+
+
+def test_a_line_of_the_journal_reads_back_as_the_run_it_was():
+    (one,) = made("a", [1], detected={5: 0.1 + 0.2, 12: 3.0}, problem="a\nb")
+    assert RunResult.of_line(one.line("abc")) == (one, "abc")
+    assert one.line("abc").count(b"\n") == 1
+
+
+# Pictures and progress
+
+
+def large(count):
+    arms = ("average", "confidence-decay", "truth", "fused")
+    runs = [
+        done
+        for number in range(count)
+        for condition in ("transit 40 %", "emergency 40 %")
+        for arm in arms
+        for done in made(arm, [1, 0, arm == "truth"], suite=f"a suite of many words {number}", condition=condition)
+    ]
+    return Results.of(Conducted(runs, Timing(1, 0, 1, 1.0, 1.0)), title="Many", seeds=3, reference="truth")
+
+
+@pytest.mark.parametrize("count", [1, MOST_ROWS // 2, 25])
+def test_no_two_names_of_a_picture_overlap(count, tmp_path, monkeypatch):
+    figures = []
+    monkeypatch.setattr(plt, "close", figures.append)
+    draw(large(count), tmp_path)
+    monkeypatch.undo()
+    for figure in figures:
+        renderer = figure.canvas.get_renderer()
+        for axes in figure.axes:
+            labels = [text for text in axes.get_yticklabels() if text.get_text() and text.get_visible()]
+            low, high = axes.get_xlim()
+            ticks = [text for text in axes.get_xticklabels() if low <= text.get_position()[0] <= high]
+            assert len(ticks) >= 2
+            for sort in (labels, ticks):
+                boxes = [text.get_window_extent(renderer) for text in sort]
+                assert not any(a.overlaps(b) for a, b in pairwise(boxes))
+            assert all(text.get_window_extent(renderer).x0 >= 0 for text in labels)
+        titles = [axes.title.get_window_extent(renderer) for axes in figure.axes]
+        assert not any(a.overlaps(b) for n, a in enumerate(titles) for b in titles[n + 1 :])
+        plt.close(figure)
+
+
+def test_elsewhere_than_on_a_terminal_progress_is_a_line_every_so_often(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr(meter.time, "monotonic", lambda: now[0])
+    console = Console(file=StringIO(), width=100)
+    with meter.Meter(console, total=110, kept=10) as shown:
+        for _ in range(100):
+            now[0] += 1.0
+            shown.advance()
+    said = console.file.getvalue().splitlines()
+    assert said[0] == "40 of 110 runs, 3600 runs/h, 0:01:10 left"
+    assert len(said) == 4
+    assert said[-1] == "110 of 110 runs, 3600 runs/h, 0:00:00 left"
+
+
+def test_a_single_seed_has_no_interval_and_nothing_says_nan(tmp_path):
+    found = Results.of(Conducted(made("a", [1]), Timing(1, 0, 1, 1.0, 1.0)), title="One", seeds=1, reference=None)
+    assert isnan(found.cells[0].heading_error_deg.ci95)
+    found.save(tmp_path)
+    draw(found, tmp_path)
+    assert orjson.loads(found.json())["cells"][0]["heading_error_deg"]["ci95"] is None
+    assert "nan" not in (tmp_path / "table.md").read_text(encoding="utf-8")
