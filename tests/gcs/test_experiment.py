@@ -11,6 +11,7 @@ import threading
 import time
 from contextlib import contextmanager
 from dataclasses import replace
+from importlib.metadata import PackageNotFoundError, version
 from io import StringIO
 from itertools import pairwise
 from math import isnan
@@ -22,7 +23,7 @@ from flights import GCS
 from rich.console import Console
 
 from gcs import cli
-from gcs.experiment import meter, run
+from gcs.experiment import meter, run, workers
 from gcs.experiment.cells import cells, suites
 from gcs.experiment.conduct import Conducted, Timing
 from gcs.experiment.plot import MOST_ROWS, draw
@@ -386,6 +387,45 @@ def test_no_cluster_is_told_in_one_sentence_without_a_long_wait(short, tmp_path)
             assert one_sentence(done.stderr), done.stderr
             assert f"--dask {address}: no scheduler answers there" in done.stderr
             assert time.monotonic() - began < 15
+
+
+class Answering:
+    """A Dask client whose workers answer what they are told to."""
+
+    def __init__(self, *answers):
+        self._answers = {f"worker {number}": answer for number, answer in enumerate(answers)}
+        self.closed = False
+
+    def nthreads(self):
+        return dict.fromkeys(self._answers, 2)
+
+    def run(self, *_, **__):
+        return self._answers
+
+    def close(self, **_):
+        self.closed = True
+
+
+@pytest.mark.parametrize(
+    ("answers", "said"),
+    [
+        ((), "no worker has joined this scheduler"),
+        ((version("trustr"), "0.0.1"), "worker worker 1 has trustr 0.0.1, this machine has"),
+        ((PackageNotFoundError("trustr"),), "worker worker 0 has no trustr, this machine has"),
+    ],
+)
+def test_workers_must_have_what_flies_here(answers, said, monkeypatch):
+    import distributed
+
+    async def reached(_):
+        pass
+
+    client = Answering(*answers)
+    monkeypatch.setattr(workers, "_reach", reached)
+    monkeypatch.setattr(distributed, "Client", lambda *_, **__: client)
+    with pytest.raises(workers.NoCluster, match=said):
+        workers.Cluster("tcp://there:1")
+    assert client.closed
 
 
 def test_without_dask_installed_the_sentence_says_how_to_get_it(gcs, short, tmp_path, monkeypatch):
