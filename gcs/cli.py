@@ -6,12 +6,12 @@ import math
 import os
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, CycloptsError, Parameter
 
+from gcs.choices import AS_IT_IS, BadUsageError, Choices, Overrides, check_many, check_seed, confirmed
 from gcs.supervision import NOBODY, Supervision
 
 if TYPE_CHECKING:
@@ -47,67 +47,11 @@ AsJson = Annotated[bool, Parameter(name="--json", negative=(), show_default=Fals
 Yes = Annotated[bool, Parameter(negative=(), show_default=False, help="Do not ask before arming.")]
 
 
-@Parameter(name="*")
-@dataclass(frozen=True, kw_only=True)
-class Choices:
-    """What a flight is to be, besides its scenario."""
-
-    controller: Annotated[
-        str | None,
-        Parameter(
-            help="Update rule: average, trust-r, median, wmsr-1, wmsr-2, confidence-decay, or your own as "
-            "package.module:function; the scenario's, if absent."
-        ),
-    ] = None
-    trust: Annotated[
-        Literal["truth", "ratings", "auto", "fused"] | None,
-        Parameter(
-            help="Where trust comes from: the simulation's knowledge, people (the study's means if nobody rates), "
-            "the swarm's own behaviour, or behaviour and people."
-        ),
-    ] = None
-    severity: Annotated[
-        float | None, Parameter(help="Speed left to degraded motors, 0 to 1 of cruise: the paper flies 0.4 and 0.7.")
-    ] = None
-    no_fault: Annotated[bool, Parameter(negative=(), show_default=False, help="Fly with everything healthy.")] = False
-    set_: Annotated[
-        tuple[str, ...],
-        Parameter(
-            name="--set",
-            negative=(),
-            show_default=False,
-            help="section.key=value; changes one key of the scenario. Repeatable.",
-        ),
-    ] = ()
-
-    def scenario(self, name: str) -> Scenario:
-        """The scenario as chosen. Raises ScenarioError, RuleError and BadUsageError."""
-        from gcs.control import settings
-        from scenarios import MotorDegradation, load
-
-        overrides = list(self.set_)
-        if self.controller is not None:
-            overrides.append(f'control.rule="{self.controller}"')
-        if self.trust is not None:
-            overrides.append(f'trust.source="{self.trust}"')
-        loaded = load(name, overrides=overrides)
-        settings(loaded)  # tries its rule, which may be anybody's, before anything is made or flown
-        if self.no_fault:
-            loaded = loaded.without_faults()
-        if self.severity is None:
-            return loaded
-        if not 0 <= self.severity <= 1:
-            raise BadUsageError(f"--severity {self.severity}: must be 0 to 1, the fraction of cruise that is left")
-        if not any(isinstance(fault, MotorDegradation) for fault in loaded.fault):
-            raise BadUsageError(f"--severity {self.severity}: there is no degraded motor in this flight")
-        return loaded.with_severity(self.severity)
-
-
 @app.command
 def run(
     scenario: ScenarioName,
     /,
-    choices: Choices = Choices(),
+    choices: Choices = AS_IT_IS,
     supervision: Supervision = NOBODY,
     *,
     seed: Annotated[int, Parameter(help="Of noise, gusts and turbulence.")] = 1,
@@ -122,7 +66,7 @@ def run(
         except ModuleNotFoundError as error:
             raise BadUsageError(f"run simulates, and needs {error.name}, which is not installed") from None
 
-        _check_seed(seed)
+        check_seed(seed)
         chosen = choices.scenario(scenario)
         ratings = supervision.known(chosen, seed=seed)
         world = Lockstep.of(chosen, seed=seed)
@@ -135,7 +79,7 @@ def run(
 def fly(
     scenario: ScenarioName,
     /,
-    choices: Choices = Choices(),
+    choices: Choices = AS_IT_IS,
     supervision: Supervision = NOBODY,
     *,
     link: Annotated[
@@ -160,13 +104,13 @@ def fly(
         from gcs.live import Live
         from wire.connection import parse
 
-        _check_seed(seed)
+        check_seed(seed)
         if not 0.0 < speed < math.inf:
             raise BadUsageError(f"--speed {speed}: must be a number above 0")
         chosen = choices.scenario(scenario).asking(LIVE_POSITIONS)
         ratings = supervision.known(chosen, seed=seed)
         connections = [connection for text in link for connection in parse(text)]
-        if arm and not _confirmed(yes):
+        if arm and not confirmed(yes, say=_say):
             return BAD_INPUT
         live = Live(connections, range(1, chosen.swarm.count + 1), speed=speed)
         try:
@@ -202,7 +146,7 @@ def reproduce(
         from gcs.reproduce import reproduce as fly_all
         from gcs.session import output_folder
 
-        _check_many(seeds, jobs)
+        check_many(seeds, jobs)
         folder = output_folder(out, "reproduce")
         try:
             result = fly_all(conditions(), seeds=seeds, jobs=jobs, console=_stderr())
@@ -240,9 +184,34 @@ def experiment(
     def command() -> int:
         from gcs.experiment.command import experiment as conduct
 
-        _check_many(seeds, jobs)
+        check_many(seeds, jobs)
         console = None if json else _stdout()
         return conduct(file, seeds=seeds, jobs=jobs, dask=dask, only=only, out=out, stdout=console, stderr=_stderr())
+
+    return _guarded(command)
+
+
+@app.command
+def identify(
+    fleet: Annotated[str, Parameter(help="A scenario, or the run.mcap (or its folder) of a flight without a fault.")],
+    /,
+    *,
+    seeds: Annotated[int, Parameter(help="Flights of the scenario, without its faults.")] = 5,
+    set_: Overrides = (),
+    json: AsJson = False,
+) -> int:
+    """Find how healthy vehicles answer and how far they stray, as keys for a scenario."""
+
+    def command() -> int:
+        from gcs.identify import as_json, as_toml, of_fleet
+
+        check_many(seeds, 1)
+        found = of_fleet(fleet, overrides=set_, seeds=seeds, console=_stderr())
+        if json:
+            _write(as_json(found))
+        else:
+            sys.stdout.write(as_toml(found) + "\n")
+        return FLOWN
 
     return _guarded(command)
 
@@ -345,37 +314,6 @@ def _report(summary: Summary, folder: Path, *, json: bool) -> None:
     if (folder / PICTURE).exists():
         lines.append(f"picture    {(folder / PICTURE).resolve()}")
     sys.stdout.write("\n".join(lines) + "\n")
-
-
-def _check_seed(seed: int | None) -> None:
-    if seed is not None and seed < 0:
-        raise BadUsageError(f"--seed {seed}: must not be negative")
-
-
-def _check_many(seeds: int | None, jobs: int) -> None:
-    if seeds is not None and seeds < 1:
-        raise BadUsageError(f"--seeds {seeds}: must be at least 1")
-    if jobs == 0:
-        raise BadUsageError("--jobs 0: must be a number of processes, or -1 for one a core")
-
-
-def _confirmed(yes: bool) -> bool:
-    """Arming moves rotors: a person types ARM, or a script says --yes."""
-    if yes:
-        return True
-    if not sys.stdin.isatty():
-        _say("gcs: --arm without a terminal needs --yes")
-        return False
-    sys.stderr.write("Rotors will turn. Type ARM to go on: ")
-    sys.stderr.flush()
-    if sys.stdin.readline().strip() == "ARM":
-        return True
-    _say("gcs: not armed")
-    return False
-
-
-class BadUsageError(ValueError):
-    """An option that cannot be obeyed, in one sentence."""
 
 
 def _guarded(command: Callable[[], int]) -> int:

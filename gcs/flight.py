@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from gcs import mission
+from gcs import losses, mission
 from gcs.autopilots import Px4
 from gcs.beliefs import Beliefs, Seen
 from gcs.commands import Beat, Command, SetVelocity
@@ -36,6 +36,7 @@ from gcs.telemetry import Swarm
 from scenarios import Scenario, offsets_ne
 from trustr.controller import Decision, Observation, decide
 from trustr.leader import VirtualLeader, capped
+from trustr.network import nearest
 from trustr.roles import taken_back
 
 Array = npt.NDArray[np.float64]
@@ -55,14 +56,14 @@ STILL, LEVEL = 0.15, 0.2
 """m/s and m: the fleet hovers in formation, and the run-up may begin."""
 HEIGHT_GAIN, CLIMB_SPEED = 0.8, 1.0
 """1/s and m/s: altitude is held apart from the consensus."""
-DOWN_BELOW = 0.25
-"""Of the altitude to be held: a vehicle lower than that in a mission has come down."""
 TOLD_S = 2.0
 """A heartbeat is a second apart: what it says is believed this long after it may have changed."""
 TAKES_BACK = 4
 """A rating from which the supervisor wants a robot back that was left behind."""
 BELOW = 3.0
 """m under the others: where robots go that are left behind."""
+CLEAR = 3.0
+"""m, horizontal: nobody this close is above a robot that climbs back."""
 RUN_UP_GAIN, RUN_UP_CAP = 0.5, 0.5
 """1/s and m/s: every robot to its place beside the moving origin."""
 
@@ -159,7 +160,7 @@ class Flight:
         elif state.phase in BEFORE_MISSION:
             silent = ~swarm.fresh(now_ns, within_ns=LOST_NS)
             if silent.any():
-                return failed(state, _fell_silent(swarm, silent, state.phase), Phase.LAND)
+                return failed(state, losses.fell_silent(swarm, silent, state.phase), Phase.LAND)
         return state
 
     def _join(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
@@ -172,7 +173,7 @@ class Flight:
             return self._climb(replace(entered(state, Phase.CLIMB), frame=frame, shift_ne=shift), swarm, now_ns)
         if (state.tick - state.phase_tick) * self._period_s > JOIN_S:
             verb = "was" if len(missing) == 1 else "were"
-            problem = f"{_vehicles(missing)} {verb} not heard, or not ready to arm, within {JOIN_S:g} s"
+            problem = f"{losses.vehicles(missing)} {verb} not heard, or not ready to arm, within {JOIN_S:g} s"
             return self._land(failed(state, problem, Phase.DONE), swarm, now_ns)
         return self._ask(
             state,
@@ -223,9 +224,8 @@ class Flight:
         if time_s >= self.plan.read_out_s - 1e-9:
             return self._land(entered(state, Phase.LAND), swarm, now_ns)
         obeying = self._autopilot.obeying(swarm)
-        state = self._note_the_lost(state, swarm, obeying, now_ns)
+        flying = obeying & ~losses.down(swarm, self.scenario.swarm.altitude_m)
         diagnosis = self._overview(state, swarm)
-        flying = obeying & ~self._down(swarm)
         heard = flying & swarm.fresh(now_ns, within_ns=STALE_NS)
         observation = Observation(diagnosis.position_ne, swarm.velocity_ned[:, :2], heard, diagnosis.trust, time_s)
         assert diagnosis.virtual is not None
@@ -233,9 +233,9 @@ class Flight:
             memory, decision = decide(state.memory, observation, diagnosis.virtual, self._settings)
         except RuleError as error:  # a researcher's own; who flies it is in the air
             return self._land(failed(abandoned(state), str(error), Phase.LAND), swarm, now_ns)
-        state = replace(state, memory=memory)
+        state = self._note_the_lost(replace(state, memory=memory), swarm, flying, now_ns)
         commanded = flying & swarm.fresh(now_ns, within_ns=LOST_NS)
-        if not decision.roles.left.any():
+        if self.scenario.trust.beyond_repair == "keep":
             return self._steer(state, swarm, decision.velocity_ne, diagnosis, decision, commanded)
         return self._leave_behind(state, swarm, diagnosis, decision, commanded)
 
@@ -247,19 +247,22 @@ class Flight:
         decision: Decision,
         commanded: npt.NDArray[np.bool_],
     ) -> Step:
-        """Steer; who was left behind sinks below the others while it goes along with them, and only there it stops."""
-        left = decision.roles.left
-        below = left & (-swarm.position_ned[:, 2] < self.scenario.swarm.altitude_m - 0.8 * BELOW)
+        """Steer; who was left behind sinks below the others while it goes along with them, and only there it stops.
+
+        Who was taken back climbs once nobody is above it.
+        """
+        left, altitude_m = decision.roles.left, self.scenario.swarm.altitude_m
+        below = -swarm.position_ned[:, 2] < altitude_m - 0.8 * BELOW
         commands: Commands = []
         if self.scenario.trust.beyond_repair == "land":
             state, commands, _ = self._ask(
-                state, swarm, lambda row: _some(self._autopilot.next_to_land(swarm, row)) if below[row] else ()
+                state, swarm, lambda row: _some(self._autopilot.next_to_land(swarm, row)) if (left & below)[row] else ()
             )
-            commanded = commanded & ~below
-        velocity = np.where(below[:, None], 0.0, decision.velocity_ne)
-        state, steering, diagnosis = self._steer(
-            state, swarm, velocity, diagnosis, decision, commanded, lower=np.where(left, BELOW, 0.0)
-        )
+            commanded = commanded & ~(left & below)
+        blocked = below & (nearest(diagnosis.position_ne) < CLEAR)
+        velocity = np.where((left & below)[:, None], 0.0, decision.velocity_ne)
+        lower = np.where(left | blocked, BELOW, 0.0)
+        state, steering, diagnosis = self._steer(state, swarm, velocity, diagnosis, decision, commanded, lower=lower)
         return state, commands + steering, diagnosis
 
     def _land(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
@@ -267,7 +270,7 @@ class Flight:
         told = (state.tick - state.phase_tick) * self._period_s >= TOLD_S
         if told and not (swarm.armed & heard).any() and state.phase is not Phase.DONE:
             unseen = swarm.armed & ~heard
-            problem = _fell_silent(swarm, unseen, state.phase) if unseen.any() else None
+            problem = losses.fell_silent(swarm, unseen, state.phase) if unseen.any() else None
             state = replace(entered(state, Phase.DONE), problem=state.problem or problem)
         return self._ask(
             state,
@@ -318,6 +321,21 @@ class Flight:
         )
         return replace(state, sent_ned=sent), commands, diagnosis
 
+    def _note_the_lost(
+        self, state: FlightState, swarm: Swarm, flying: npt.NDArray[np.bool_], now_ns: int
+    ) -> FlightState:
+        """The first vehicle to be lost is why the flight is incomplete; those that were left behind are not missed."""
+        if state.problem is not None or state.memory is None:
+            return state
+        silent = ~swarm.fresh(now_ns, within_ns=LOST_NS)
+        missed = (silent | ~flying) & ~state.memory.roles.left
+        if not missed.any():
+            return state
+        row = int(np.argmax(missed))
+        how = losses.how(swarm, row, silent=bool(silent[row]), altitude_m=self.scenario.swarm.altitude_m)
+        when = f"{self._mission_s(state):.1f} s into the mission"
+        return replace(state, problem=f"vehicle {swarm.ids[row]} {how} {when}")
+
     def _overview(self, state: FlightState, swarm: Swarm) -> Diagnosis:
         """What every phase has to say."""
         position, time_s = self._position_ne(state, swarm), self._mission_s(state)
@@ -346,32 +364,6 @@ class Flight:
             north, east = self.plan.segments[-1].velocity_ne
         return math.atan2(east, north)
 
-    def _note_the_lost(
-        self, state: FlightState, swarm: Swarm, obeying: npt.NDArray[np.bool_], now_ns: int
-    ) -> FlightState:
-        """The first vehicle to fall silent, to come down or to leave our mode is why the flight is incomplete."""
-        if state.problem is not None:
-            return state
-        expected = np.zeros(len(swarm.ids), bool) if state.memory is None else state.memory.roles.left
-        silent = ~swarm.fresh(now_ns, within_ns=LOST_NS) & ~expected
-        down = self._down(swarm) & ~expected
-        obeying = obeying | expected
-        if obeying.all() and not (silent | down).any():
-            return state
-        when = f"{self._mission_s(state):.1f} s into the mission"
-        for row, system in enumerate(swarm.ids):
-            if silent[row]:
-                return replace(state, problem=f"vehicle {system} fell silent {when}")
-            if down[row]:
-                return replace(state, problem=f"vehicle {system} came down {when}")
-            if not obeying[row]:
-                return replace(state, problem=f"vehicle {system} left the ground station's control {when}")
-        return state
-
-    def _down(self, swarm: Swarm) -> npt.NDArray[np.bool_]:
-        """(N,) who is near the ground; False where nothing is known."""
-        return np.asarray(-swarm.position_ned[:, 2] < DOWN_BELOW * self.scenario.swarm.altitude_m)
-
     def _mission_s(self, state: FlightState) -> float:
         return math.nan if state.mission_tick is None else (state.tick - state.mission_tick) * self._period_s
 
@@ -389,15 +381,6 @@ def _by_tick(scenario: Scenario, ratings: Iterable[Rating]) -> dict[int, tuple[R
         tick = scenario.time.ticks(max(0.0, rating.time_s or 0.0))
         due[tick] = (*due.get(tick, ()), rating)
     return due
-
-
-def _fell_silent(swarm: Swarm, silent: npt.NDArray[np.bool_], phase: Phase) -> str:
-    mute = [system for system, is_mute in zip(swarm.ids, silent, strict=True) if is_mute]
-    return f"{_vehicles(mute)} fell silent while {phase.value}"
-
-
-def _vehicles(systems: list[int]) -> str:
-    return f"{'vehicle' if len(systems) == 1 else 'vehicles'} {', '.join(map(str, systems))}"
 
 
 def _some(command: Command | None) -> tuple[Command, ...]:

@@ -115,3 +115,8 @@ def abandoned(state: FlightState) -> FlightState:
 def failed(state: FlightState, problem: str, phase: Phase) -> FlightState:
     """On to `phase`, and why; the first problem of a flight is the one that is told."""
     return replace(entered(state, phase), problem=state.problem or problem)
+
+
+def left_behind(state: FlightState) -> list[int]:
+    """System ids of the robots that the swarm went on without."""
+    return [] if state.memory is None else [int(row) + 1 for row in np.flatnonzero(state.memory.roles.left)]

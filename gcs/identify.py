@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import orjson
 from gcs.loop import Tick, fly
 from gcs.recording.reader import SteeredTick, UnreadableRecording, located, steered
 from gcs.trial import ToItsReadOut
-from scenarios import Scenario
+from scenarios import Scenario, ScenarioError, load
 from trustr.identification import SETTLING_S, Identified, Sample, identify
 from trustr.network import Array
 from trustr.response import Response, mean_lag_s
@@ -21,10 +21,24 @@ SHORTEST_S = 2.0 * SETTLING_S
 """Of set-points in a recording."""
 
 
-def of_scenario(scenario: Scenario, *, seeds: int, progress: Any) -> Identified:
-    """Fly a scenario without its faults so many times, and identify its vehicles; progress: wraps the seeds."""
-    healthy = scenario.without_faults()
-    return identify([_flown(healthy, seed) for seed in progress(range(1, seeds + 1))], dt=scenario.time.period_s)
+def of_fleet(name: str, *, overrides: Sequence[str], seeds: int, console: Any) -> Identified:
+    """Identify the vehicles of a recording, or of a scenario's name or file. Raises what either raises."""
+    path = located(Path(name))
+    if path.suffix == ".mcap":
+        if overrides:
+            raise ScenarioError(f"--set {overrides[0]}: a recording has been flown; nothing of it can be changed")
+        return of_recording(path)
+    return of_scenario(load(name, overrides=overrides), seeds=seeds, console=console)
+
+
+def of_scenario(scenario: Scenario, *, seeds: int, console: Any) -> Identified:
+    """Fly a scenario without its faults so many times, and identify its vehicles."""
+    from rich.progress import track
+
+    healthy, flights = scenario.without_faults(), range(1, seeds + 1)
+    silent = not console.is_terminal
+    samples = [_flown(healthy, seed) for seed in track(flights, "flights", console=console, disable=silent)]
+    return identify(samples, dt=scenario.time.period_s)
 
 
 def of_recording(path: Path) -> Identified:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from gcs.events import Rating
 from gcs.flight import Flight
-from gcs.flight_state import FlightState
+from gcs.flight_state import FlightState, left_behind
 from gcs.loop import Clock, Link, Record, fly
 from gcs.operator import Operator
 from gcs.recording.reader import RECORDING
@@ -175,6 +175,7 @@ def _summary(
         passed=bool(result and result.passed and problem is None),
         detected={} if result is None else {str(k): v for k, v in result.detected.items()},
         false_alarms=0 if result is None else result.false_alarms,
+        left_behind=left_behind(state),
         simulated_s=round(simulated_s, 6),
         real_time_factor=round(simulated_s / took_s, 2),
         recording=str(recording),

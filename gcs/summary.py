@@ -30,6 +30,8 @@ class Summary:
     detected: dict[str, float]
     """System id → seconds from the fault's onset until its trust fell below 0.5."""
     false_alarms: int
+    left_behind: list[int]
+    """System ids of robots beyond repair that the swarm went on without."""
     simulated_s: float
     real_time_factor: float
     recording: str

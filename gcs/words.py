@@ -82,9 +82,10 @@ def verdict(summary: Summary) -> str:
         return f"{flight}\nended before its read-out: no score"
     closest = summary.min_separation_m
     apart = "" if math.isinf(closest) else f", robots never closer than {closest:.1f} m"
+    without = f", without robot {', '.join(map(str, summary.left_behind))}" if summary.left_behind else ""
     on = "" if summary.scored_on == "truth" else " (by telemetry: no truth was told)"
     return (
         f"{flight}\n{'passed' if summary.passed else 'failed'}: heading off by {summary.heading_error_deg:.1f}°, "
-        f"{summary.distance_to_target_m:.1f} m from the target{apart}{on}\n"
+        f"{summary.distance_to_target_m:.1f} m from the target{apart}{without}{on}\n"
         f"{summary.simulated_s:.1f} s flown at {summary.real_time_factor:.0f} × real time"
     )

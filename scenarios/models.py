@@ -285,6 +285,10 @@ class Expect(Section):
     min_separation_m: NotNegative = 1.0
 
 
+LOWEST_TO_LEAVE = 6.0
+"""m: altitude from which there is room below the swarm."""
+
+
 class Scenario(Section):
     """One flight, from formation to what counts as success."""
 
@@ -320,6 +324,11 @@ class Scenario(Section):
                     f"between {flown:g} m and {planned:g} m"
                 )
             flown, planned = event.at_length_m, event.at_length_m + event.length_m
+        if self.trust.beyond_repair != "keep" and self.swarm.altitude_m < LOWEST_TO_LEAVE:
+            raise ValueError(
+                f"trust.beyond_repair = {self.trust.beyond_repair!r} at swarm.altitude_m = {self.swarm.altitude_m}: "
+                f"robots that are left behind go 3 m below the others; it must be {LOWEST_TO_LEAVE:g} m or more"
+            )
         if self.mission.cruise_m_s > self.limits.speed_m_s:
             raise ValueError(
                 f"mission.cruise_m_s = {self.mission.cruise_m_s} is above limits.speed_m_s = {self.limits.speed_m_s}"

@@ -191,7 +191,7 @@ def shared(raw_ne: Array, told: Flags) -> Array:
         return np.zeros(2)
     ordered = np.sort(raw_ne[told], axis=0)
     low, high = ordered[(count - 1) // 3], ordered[-1 - (count - 1) // 3]
-    return np.maximum(low, 0.0) + np.minimum(high, 0.0)
+    return np.asarray(np.maximum(low, 0.0) + np.minimum(high, 0.0))
 
 
 def neighbourhood(graph: Graph, velocity_ne: Array, trusted: Flags) -> Array:
