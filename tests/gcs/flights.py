@@ -106,27 +106,31 @@ class Recorded:
 
 
 @cache
-def recorded(name, *overrides, seed=1):
-    """One lockstep flight as `gcs run` flies it."""
-    return fly_and_record(name, *overrides, seed=seed)
+def recorded(name, *overrides, seed=1, ratings=None):
+    """One lockstep flight as `gcs run` flies it. ratings: a tuple known beforehand; None where nobody rates."""
+    return fly_and_record(name, *overrides, seed=seed, ratings=ratings)
 
 
-def fly_and_record(name, *overrides, seed=1, through=None, out=None, events=tuple, watching=lambda _flight: ()):
+def fly_and_record(
+    name, *overrides, seed=1, through=None, out=None, events=tuple, watching=lambda _flight: (), ratings=None
+):
     """The same, not shared. through: wraps (link, clock);  events: what an operator says at each tick."""
     scenario = load(name, overrides=overrides)
     folder = scratch() if out is None else out
     world = Lockstep.of(scenario, seed=seed)
     link = Counting(world if through is None else through(world, world))
     operator = Saying(events)
-    summary = flown(name, scenario, link, world, seed=seed, out=folder, operator=operator, watching=watching)
+    summary = flown(
+        name, scenario, link, world, seed=seed, out=folder, operator=operator, watching=watching, ratings=ratings
+    )
     return Recorded(scenario, summary, folder, link)
 
 
-def sent_by(known, *, world, seed=1):
+def sent_by(known, *, world, seed=1, ratings=None):
     """Every frame that a ground station which knows one scenario sends to the vehicles of another."""
     vehicles = Lockstep.of(world, seed=seed)
     link = Counting(vehicles)
-    fly(link, vehicles, Flight(known), (), period_ns=known.time.period_ns)
+    fly(link, vehicles, Flight(known, ratings=ratings), (), period_ns=known.time.period_ns)
     return link.sent
 
 

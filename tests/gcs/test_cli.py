@@ -22,7 +22,7 @@ CONTRACT = {
     "scenario", "controller", "trust", "severity", "seed", "heading_error_deg", "distance_to_target_m",
     "min_separation_m", "passed", "detected", "false_alarms", "simulated_s", "real_time_factor", "recording",
 }  # fmt: skip
-BESIDES = {"profile", "scored_on", "problem", "faults", "swarm_heading_error_deg", "rejected_frames"}
+BESIDES = {"profile", "scored_on", "problem", "faults", "swarm_heading_error_deg", "rejected_frames", "left_behind"}
 """Keys that the contract does not have yet."""
 BRIEFLY = [word for override in SHORT for word in ("--set", override)]
 

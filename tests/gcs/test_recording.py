@@ -21,7 +21,9 @@ from scenarios import Scenario
 from wire.frames import Framer
 
 SYSTEMS = range(1, 7)
-OURS = {"/tick", "/mission", "/trust", "/weights", "/setpoint", "/swarm/state", "/truth/pose", "/truth/fault"}
+OURS = {
+    "/tick", "/mission", "/trust", "/weights", "/roles", "/setpoint", "/swarm/state", "/truth/pose", "/truth/fault",
+}  # fmt: skip
 RAW = {f"/mavlink/{system}_{component}/raw" for system in SYSTEMS for component in (1, 200)}
 GROUND = "/mavlink/255_190/raw"
 
@@ -120,7 +122,7 @@ def test_every_message_of_ours_is_what_its_schema_says(flight):
             else:
                 assert channel.message_encoding == "mavlink"
                 assert schema is None
-    assert checked == {"tick", "mission", "trust", "weights", "setpoint", "swarm", "uav", "truth"}
+    assert checked == {"tick", "mission", "trust", "weights", "roles", "setpoint", "swarm", "uav", "truth"}
 
 
 KINDS = {
