@@ -43,7 +43,8 @@ NOISE_MEMORY_S = 1.0
 UNREST_MEMORY_S = 2.0
 """Low pass of the variance that most robots show."""
 PLACE_MEMORY_S = 1.0
-"""How long positions are predicted from reported velocities before they are believed."""
+"""How long positions are predicted from reported velocities before they are believed; after longer silence they are
+believed at once."""
 WILDEST = 3.0
 """m/s and m: no single residual counts for more, so that one wild message is not ten."""
 ENOUGH_TO_SHARE = 3
@@ -94,6 +95,8 @@ class Evidence:
     """m²: the same of reported positions."""
     unrest: float
     """m²/s²: variance of the smoothed response residual of most robots, an axis: gusts, or a model that is off."""
+    silent_s: Array
+    """(N,) s: for how long nothing new has been heard."""
     log_odds: Array
     """(N,) of being faulty."""
 
@@ -113,6 +116,7 @@ class Evidence:
             velocity_noise=watch.tolerance**2,
             place_noise=watch.place_tolerance**2,
             unrest=0.0,
+            silent_s=np.zeros(len(velocity_ne)),
             log_odds=np.full(len(velocity_ne), PRIOR),
         )
 
@@ -137,14 +141,19 @@ def weigh(
     expected = follow(watch.response, evidence.expected, commanded, dt=watch.dt)
     smooth, remember = _share(SMOOTHING_S, watch.dt), _share(NOISE_MEMORY_S, watch.dt)
 
-    raw = _update(evidence.raw_ne, capped(velocity_ne - expected.velocity_ne, WILDEST), told)
+    off = velocity_ne - expected.velocity_ne
+    believable = capped(off, WILDEST)
+    raw = _update(evidence.raw_ne, believable, told)
     own = raw - shared(raw, told)
     residual = _update(evidence.residual_ne, evidence.residual_ne + smooth * (own - evidence.residual_ne), told)
     velocity_noise = _noise(evidence.velocity_noise, raw - evidence.raw_ne, told, remember)
 
-    predicted = np.where(told[:, None], evidence.predicted_ne + watch.dt * velocity_ne, position_ne)
+    # one wild velocity must not carry the prediction off; and who is silent flies on as healthy robots would
+    flown = _update(expected.velocity_ne, velocity_ne - (off - believable), told)
+    predicted = evidence.predicted_ne + watch.dt * flown
+    predicted = _update(predicted, position_ne, told & (evidence.silent_s > PLACE_MEMORY_S))
     strayed = _update(evidence.strayed_ne, capped(position_ne - predicted, WILDEST), told)
-    predicted = predicted + _share(PLACE_MEMORY_S, watch.dt) * strayed
+    predicted = _update(predicted, predicted + _share(PLACE_MEMORY_S, watch.dt) * strayed, told)
     inconsistency = evidence.inconsistency_ne + smooth * (strayed - evidence.inconsistency_ne)
     place_noise = _noise(evidence.place_noise, strayed - evidence.strayed_ne, told, remember)
 
@@ -159,6 +168,7 @@ def weigh(
         inconsistency_ne=_update(evidence.inconsistency_ne, inconsistency, told),
         velocity_noise=velocity_noise,
         place_noise=place_noise,
+        silent_s=np.where(told, 0.0, evidence.silent_s + watch.dt),
         unrest=evidence.unrest + _share(UNREST_MEMORY_S, watch.dt) * (_unrest(residual, told) - evidence.unrest),
     )
     return watched if graph is None else _judge(watched, watch, velocity_ne, told, graph)
