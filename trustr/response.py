@@ -69,7 +69,8 @@ def _shaped(response: Response, motion: Motion, wanted_ne: Array, dt: float) -> 
     error = np.maximum(np.hypot(error_ne[:, 0], error_ne[:, 1]), 1e-9)
     in_proportion = response.jerk * response.lag_s**2
     by_root = np.sqrt(2.0 * response.jerk * np.maximum(error - 0.5 * in_proportion, 0.0))
-    asked = np.minimum(np.where(error <= in_proportion, error / max(response.lag_s, 1e-9), by_root), response.acceleration)
+    by_lag = error / max(response.lag_s, 1e-9)
+    asked = np.minimum(np.where(error <= in_proportion, by_lag, by_root), response.acceleration)
     change_ne = error_ne * (asked / error)[:, None] - motion.acceleration_ne
     change = np.maximum(np.hypot(change_ne[:, 0], change_ne[:, 1]), 1e-9)
     acceleration_ne = motion.acceleration_ne + change_ne * np.minimum(1.0, response.jerk * dt / change)[:, None]
