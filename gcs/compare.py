@@ -12,6 +12,7 @@ from rich.text import Text
 
 from gcs.recording.reader import Flown, UnreadableRecording, located, read
 from gcs.scoring import Score, score
+from gcs.summary import trust_of
 from gcs.words import faults
 
 FORMATS = (".png", ".pdf", ".svg")
@@ -53,8 +54,28 @@ def _table(flights: Sequence[Flown]) -> Table:
     for words, name, form in rows:
         table.add_row(words, *("–" if s is None else form.format(getattr(s, name)) for s in scores))
     table.add_row("what goes wrong", *(Text(", ".join(faults(flight.scenario)) or "nothing") for flight in flights))
+    table.add_row("distrusted after", *map(_found, flights, scores))
+    if any(map(_left_behind, flights)):
+        table.add_row("left behind", *(_robots(_left_behind(flight)) for flight in flights))
     table.add_row("mission", *map(_verdict, flights, scores))
     return table
+
+
+def _found(flight: Flown, result: Score | None) -> str:
+    """Who was rightly distrusted, how soon, and how many wrongly."""
+    if result is None or trust_of(flight.scenario) is None:
+        return "–"
+    found = [f"robot {system}: {seconds:.1f} s" for system, seconds in result.detected.items()]
+    wrongly = [f"{result.false_alarms} wrongly"] if result.false_alarms else []
+    return ", ".join(found + wrongly) or "nobody"
+
+
+def _left_behind(flight: Flown) -> tuple[int, ...]:
+    return flight.track.parts[-1].left_behind if flight.track is not None and flight.track.parts else ()
+
+
+def _robots(systems: Sequence[int]) -> str:
+    return f"robot {', '.join(map(str, systems))}" if systems else "nobody"
 
 
 def _verdict(flight: Flown, result: Score | None) -> Text:

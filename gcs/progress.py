@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 from types import TracebackType
 
 from rich.console import Console, Group
@@ -16,6 +17,7 @@ from rich.text import Text
 from gcs.flight import Flight
 from gcs.flight_state import Phase
 from gcs.loop import Tick
+from gcs.track import Parts, parts_of
 from wire.modes import px4_mode_name
 
 REFRESH_S = 0.1
@@ -38,6 +40,8 @@ class Display:
         self._live = Live(console=console, transient=True, auto_refresh=False) if console.is_terminal else None
         self._shown = -math.inf
         self._phase: Phase | None = None
+        self._at_first = Parts(0.0, flight.scenario.swarm.leaders, ())
+        self._parts = self._at_first
 
     def __enter__(self) -> Display:
         if self._live is not None:
@@ -56,6 +60,10 @@ class Display:
         for system, severity, text in tick.swarm.words:
             if severity <= WARNING:
                 self._console.print(f"vehicle {system}: {text}", highlight=False, markup=False)
+        parts = parts_of(tick) or self._at_first
+        for words in _news(self._parts, parts):
+            self._console.print(f"{_clock(tick, self._flight)}  {words}", highlight=False)
+        self._parts = parts
         if self._live is None:
             if phase is not self._phase:
                 self._console.print(f"{_clock(tick, self._flight)}  {phase.value}", highlight=False)
@@ -84,14 +92,13 @@ class Display:
         for column in ("north", "east", "height", "speed", "battery", "link age", "trust"):
             table.add_column(column, justify="right", no_wrap=True)
         swarm, diagnosis = tick.swarm, tick.diagnosis
-        leaders = self._flight.scenario.swarm.leaders
         for row, system in enumerate(swarm.ids[:MOST_ROWS]):
             north, east = diagnosis.position_ne[row]
             age_s = (tick.time_ns - int(swarm.position_ns[row])) / 1e9
             heard = swarm.position_ns[row] > 0
             table.add_row(
                 str(system),
-                "leader" if system in leaders else "follower",
+                _part(system, self._parts),
                 _mode(bool(swarm.armed[row]), int(swarm.custom_mode[row])),
                 _number(north, "m"),
                 _number(east, "m"),
@@ -106,6 +113,25 @@ class Display:
         if len(swarm.ids) > MOST_ROWS:
             table.caption = f"and {len(swarm.ids) - MOST_ROWS} more"
         return table
+
+
+def _part(system: int, parts: Parts) -> Text:
+    if system in parts.left_behind:
+        return Text("left behind", style="yellow")
+    return Text("leader" if system in parts.leaders else "follower")
+
+
+def _news(before: Parts, now: Parts) -> Iterator[str]:
+    """What changed in who leads and who was left behind."""
+    for old, new in zip(before.leaders, now.leaders, strict=True):
+        if old != new:
+            yield f"robot {new} leads in place of robot {old}"
+    for system in now.left_behind:
+        if system not in before.left_behind:
+            yield f"robot {system} is left behind"
+    for system in before.left_behind:
+        if system not in now.left_behind:
+            yield f"robot {system} is taken back"
 
 
 def _waiting(tick: Tick) -> str:

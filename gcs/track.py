@@ -1,4 +1,4 @@
-"""What is kept of a mission for its score and its picture: who was where, who was trusted."""
+"""What is kept of a mission for its score and its picture: who was where, who was trusted, who led."""
 
 from __future__ import annotations
 
@@ -29,9 +29,11 @@ class Track:
     """(T, 2) m: the virtual leader."""
     measured: bool
     """True where positions are telemetry, because no simulation told the truth."""
+    parts: tuple[Parts, ...] = ()
+    """At mission start, and whenever they changed; none where nothing tells."""
 
     @staticmethod
-    def of(points: Sequence[Point], *, read_out_s: float) -> Track | None:
+    def of(points: Sequence[Point], *, read_out_s: float, parts: Sequence[Parts] = ()) -> Track | None:
         """A track of points in the order of time, as far as the first at the read-out; None of no points."""
         before = sum(point.time_s < read_out_s - 1e-9 for point in points)
         points = points[: before + 1]
@@ -43,7 +45,18 @@ class Track:
             trust=np.array([point.trust for point in points]),
             virtual_ne=np.array([point.virtual_ne for point in points]),
             measured=any(point.measured for point in points),
+            parts=tuple(part for part in parts if part.time_s <= points[-1].time_s),
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """Who has which part in the swarm, by system ids, from a time on."""
+
+    time_s: float
+    """Since mission start."""
+    leaders: tuple[int, ...]
+    left_behind: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,17 +80,24 @@ class Tracker:
         self._truth = truth
         self._read_out_s = flight.plan.read_out_s
         self._points: list[Point] = []
+        self._parts: list[Parts] = []
 
     def tick(self, tick: Tick) -> None:
         """Keep this tick, if it belongs to the mission."""
         point = point_of(tick, self._truth)
         if point is not None:
             self._points.append(point)
+            self._keep_parts(tick)
 
     @property
     def track(self) -> Track | None:
         """All that was kept; None where the mission never began."""
-        return Track.of(self._points, read_out_s=self._read_out_s)
+        return Track.of(self._points, read_out_s=self._read_out_s, parts=self._parts)
+
+    def _keep_parts(self, tick: Tick) -> None:
+        parts = parts_of(tick)
+        if parts is not None and (not self._parts or changed(self._parts[-1], parts)):
+            self._parts.append(parts)
 
 
 def point_of(tick: Tick, truth: Truth) -> Point | None:
@@ -96,3 +116,17 @@ def point_of(tick: Tick, truth: Truth) -> Point | None:
         diagnosis.virtual.position_ne,
         measured=not truth.known,
     )
+
+
+def parts_of(tick: Tick) -> Parts | None:
+    """Who has which part at a tick; None before the mission."""
+    memory, ids = tick.state.memory, tick.swarm.ids
+    if memory is None:
+        return None
+    leaders, left = ((ids[row] for row in rows) for rows in (memory.roles.leaders, np.flatnonzero(memory.roles.left)))
+    return Parts(tick.diagnosis.mission_s, tuple(leaders), tuple(left))
+
+
+def changed(before: Parts, after: Parts) -> bool:
+    """Whether anybody's part is another."""
+    return (before.leaders, before.left_behind) != (after.leaders, after.left_behind)

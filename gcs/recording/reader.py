@@ -20,7 +20,7 @@ from gcs.events import Event, Rating
 from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
 from gcs.mission import plan
 from gcs.recording.writer import METADATA, SCENARIO, SUMMARY
-from gcs.track import Point, Track
+from gcs.track import Parts, Point, Track
 from scenarios import Scenario
 from wire.frames import Frame, Framer
 
@@ -74,10 +74,11 @@ def read(path: Path) -> Flown:
         if scenario is None or METADATA not in metadata:
             raise UnreadableRecording(f"{path}: an MCAP file, but no flight of ours: it holds no {SCENARIO}")
         loaded = Scenario.model_validate_json(scenario)
-        points = list(_points(reader))
+        points, parts = list(_points(reader)), list(_parts(reader))
         problem = orjson.loads(metadata[SUMMARY]["json"])["problem"] if SUMMARY in metadata else CUT_SHORT
     rated = metadata[METADATA].get("ratings", "") != ""
-    return Flown(path, loaded, rated, problem, Track.of(points, read_out_s=plan(loaded).read_out_s))
+    track = Track.of(points, read_out_s=plan(loaded).read_out_s, parts=parts)
+    return Flown(path, loaded, rated, problem, track)
 
 
 @contextmanager
@@ -116,6 +117,12 @@ def _points(reader: Any) -> Iterator[Point]:
             virtual_ne=np.array([there["north_m"], there["east_m"]]),
             measured=measured,
         )
+
+
+def _parts(reader: Any) -> Iterator[Parts]:
+    for _schema, _channel, message in reader.iter_messages(topics="/roles"):
+        content = orjson.loads(message.data)
+        yield Parts(content["mission_s"], tuple(content["leaders"]), tuple(content["left_behind"]))
 
 
 def _upwards(position_ned: list[list[float | None]]) -> npt.NDArray[np.float64]:
