@@ -16,9 +16,11 @@ LONGEST_S = 3.0
 """Delays and lags are looked for up to here."""
 STARTS = ((0.15, 0.3), (0.4, 1.0))
 """Delay and lag [s] from which the fit begins: quick vehicles, and slow ones."""
-BOUNDED_START = (0.3, 0.3, 2.5, 5.0)
-LEAST, MOST = (0.0, 0.02, 0.2, 0.2), (LONGEST_S, LONGEST_S, 20.0, 50.0)
-"""Delay, lag [s], acceleration [m/s²] and jerk [m/s³] of vehicles with bounds: where the fit begins, and its limits."""
+BOUNDED_START = (0.3, 2.5, 5.0)
+LEAST, MOST = (0.02, 0.2, 0.2), (LONGEST_S, 20.0, 50.0)
+"""Lag [s], acceleration [m/s²] and jerk [m/s³] of vehicles with bounds: where the fit begins, and its limits."""
+ROUGHLY = 0.01
+"""Of cost and parameters: good enough to see which delay is the best."""
 WORTH_IT = 0.9
 """Of the squared error: bounds that take off less than a tenth are no bounds."""
 SETTLING_S = 3.0
@@ -87,7 +89,25 @@ def _best(samples: Sequence[Sample], dt: float) -> tuple[Response, Array]:
     without = min(free, key=lambda fit: float(fit.cost))
     if np.mean(without.fun**2) * WORTH_IT < _white(samples, Response(*map(float, without.x)), dt):
         return Response(*map(float, without.x)), np.asarray(without.fun)
-    with_bounds = least_squares(errors, BOUNDED_START, bounds=(LEAST, MOST), diff_step=1e-2, x_scale=BOUNDED_START)
+
+    def bounded(delay_s: float) -> tuple[float, Array]:
+        """Cost, and delay, lag, acceleration and jerk, of the best vehicle with bounds and this delay."""
+        fit = least_squares(
+            lambda rest: errors(np.array([delay_s, *rest])),
+            BOUNDED_START,
+            bounds=(LEAST, MOST),
+            diff_step=1e-2,
+            x_scale=BOUNDED_START,
+            ftol=ROUGHLY,
+            xtol=ROUGHLY,
+        )
+        return float(fit.cost), np.array([delay_s, *fit.x])
+
+    # within every tick of delay the cost has a minimum of its own; over whole ticks it has one
+    late = range(1 + int(sum(without.x) / dt))
+    _, start = min((bounded(ticks * dt) for ticks in late), key=lambda found: found[0])
+    limits = (0.0, *LEAST), (LONGEST_S, *MOST)
+    with_bounds = least_squares(errors, start, bounds=limits, diff_step=1e-2, x_scale=(0.3, *BOUNDED_START))
     best = with_bounds if with_bounds.cost < WORTH_IT * without.cost else without
     return Response(*map(float, best.x)), np.asarray(best.fun)
 
