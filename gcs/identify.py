@@ -10,9 +10,9 @@ import numpy as np
 import orjson
 
 from gcs.loop import Tick, fly
-from gcs.recording.reader import SteeredTick, UnreadableRecording, located, steered
+from gcs.recording.reader import SteeredTick, UnreadableRecording, located, read, steered
 from gcs.trial import ToItsReadOut
-from scenarios import Scenario, ScenarioError, load
+from scenarios import Scenario, ScenarioError, load, names
 from trustr.identification import SETTLING_S, Identified, Sample, identify
 from trustr.network import Array
 from trustr.response import Response, mean_lag_s
@@ -24,7 +24,7 @@ SHORTEST_S = 2.0 * SETTLING_S
 def of_fleet(name: str, *, overrides: Sequence[str], seeds: int, console: Any) -> Identified:
     """Identify the vehicles of a recording, or of a scenario's name or file. Raises what either raises."""
     path = located(Path(name))
-    if path.suffix == ".mcap":
+    if path.suffix == ".mcap" and name not in names():  # a folder may be called as a scenario is
         if overrides:
             raise ScenarioError(f"--set {overrides[0]}: a recording has been flown; nothing of it can be changed")
         return of_recording(path)
@@ -44,6 +44,10 @@ def of_scenario(scenario: Scenario, *, seeds: int, console: Any) -> Identified:
 def of_recording(path: Path) -> Identified:
     """Identify the vehicles of a recording in which nothing failed. Raises UnreadableRecording."""
     path = located(path)
+    wrong = [fault for fault in read(path).scenario.fault if fault.blamed is not None]
+    if wrong:
+        robot = f"robot {wrong[0].vehicle}"
+        raise UnreadableRecording(f"{path}: it takes a flight in which nothing fails, and in this one {robot} does")
     period_s, ticks = steered(path)
     samples = [sample for sample in _stretches(ticks) if len(sample.velocity_ne) * period_s >= SHORTEST_S]
     if not samples:
