@@ -11,12 +11,15 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+import orjson
 from mcap.reader import NonSeekingReader
 from mcap.writer import Writer
 
 from gcs.flight import Flight
 from gcs.lockstep import Lockstep
 from gcs.loop import fly
+from gcs.mission import plan
 from gcs.recording.reader import Flown, read
 from gcs.session import flown
 from gcs.summary import Summary
@@ -189,3 +192,16 @@ def rewritten(path, change):
             writer.add_metadata(metadata.name, metadata.metadata)
         writer.finish()
     return copy
+
+
+def told(flight, topic):
+    """Every message of one of our own topics, in its order."""
+    return [orjson.loads(data) for name, _, data in messages(flight.path) if name == topic]
+
+
+def column(flight, topic, key):
+    """A mission's times (T,), and one list over vehicles at each of them (T, N, …), as far as the read-out."""
+    read_out_s = plan(flight.scenario).read_out_s
+    flown = [row for row in told(flight, topic) if row["mission_s"] is not None]
+    rows = [row for row in flown if row["mission_s"] <= read_out_s + 1e-9]
+    return np.array([row["mission_s"] for row in rows]), np.array([row[key] for row in rows])

@@ -1,5 +1,6 @@
 """Flights side by side: the table says which one passed, the picture shows both."""
 
+from dataclasses import replace
 from io import StringIO
 
 import matplotlib.image as mpimg
@@ -8,8 +9,9 @@ from flights import fly_and_record, recorded
 from rich.console import Console
 
 from gcs.compare import UnwritablePicture, compare
-from gcs.picture import FAILED, HEALTHY
+from gcs.picture import FAILED, FAULT, HEALTHY, draw
 from gcs.recording.reader import UnreadableRecording
+from scenarios import load
 
 AVERAGE = ("emergency", 'control.rule="average"')
 
@@ -80,6 +82,59 @@ def test_every_run_leaves_a_picture_of_its_own():
     assert image.shape[0] > 700
     assert shade(image, FAILED) > 300
     assert shade(pixels(recorded("demo").folder / "trajectory.png"), FAILED) == 0
+
+
+LEFT = ("emergency", 'trust.source="auto"', 'control.profile="recommended"', 'trust.beyond_repair="hold"')
+BOTH = 'fault=[{vehicle=1, kind="motor_degradation"}, {vehicle=3, kind="motor_degradation", onset_s=6}]'
+
+
+def row(words, name):
+    (found,) = (line for line in words.splitlines() if line.strip().startswith(name))
+    return found.split(name)[1].split()
+
+
+def test_the_table_says_who_was_distrusted_how_soon_and_who_was_left_behind(tmp_path):
+    flight = recorded(*LEFT, "fault.0.vehicle=1")
+    paths = recorded(*AVERAGE).path, recorded("emergency").path, flight.path
+    words = compared(*paths, picture=tmp_path / "c.png")
+    found = f"{flight.summary.detected['1']:.1f}"
+    assert " ".join(row(words, "distrusted after")) == f"– robot 5: 0.0 s robot 1: {found} s"
+    assert " ".join(row(words, "left behind")) == "nobody nobody robot 1"
+
+
+def test_where_nobody_was_left_behind_the_table_does_not_ask(both):
+    assert "left behind" not in both[0]
+
+
+def drawn(track, scenario, path):
+    draw(track, scenario, path)
+    return pixels(path)
+
+
+def test_the_picture_tells_two_faulty_robots_left_behind_from_the_others(tmp_path):
+    flown = recorded(*LEFT, BOTH).read()
+    assert flown.track.parts[-1].left_behind == (1, 3)
+    image = drawn(flown.track, flown.scenario, tmp_path / "left.png")
+    untold = drawn(replace(flown.track, parts=()), flown.scenario, tmp_path / "untold.png")
+    assert image.shape[1] == untold.shape[1]
+    legend, legend_untold = image[-100:], untold[-100:]
+    assert shade(legend, FAILED) > shade(legend_untold, FAILED) > 50
+    assert shade(image, FAULT) > 5000
+
+
+def test_a_wind_on_everyone_shades_its_time_and_blames_nobody(tmp_path):
+    wind = 'fault=[{vehicle=1, kind="wind", speed_m_s=6, from_deg=90, everyone=true, onset_s=5}]'
+    flown = recorded("emergency", 'trust.source="auto"', wind).read()
+    image = drawn(flown.track, flown.scenario, tmp_path / "wind.png")
+    assert shade(image, FAILED) == 0
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_flight_in_which_everybody_fails_is_drawn_too(tmp_path):
+    flown = recorded("demo").read()
+    everybody = ", ".join(f'{{vehicle={system}, kind="frozen_telemetry"}}' for system in range(1, 7))
+    image = drawn(flown.track, load("demo", overrides=[f"fault=[{everybody}]"]), tmp_path / "all.png")
+    assert shade(image, HEALTHY[0]) == 0
 
 
 def test_one_recording_alone_is_a_table_with_one_column(tmp_path):

@@ -6,6 +6,7 @@ import subprocess
 import pytest
 from flights import GCS, digest, messages, recorded, scratch, sent_by
 
+from gcs.ratings import schedule
 from scenarios import load
 
 EMERGENCY = load("emergency")
@@ -60,3 +61,37 @@ def test_trust_r_that_trusts_everybody_sends_what_it_would_send_if_it_knew_of_no
 def test_a_fault_does_change_what_the_vehicles_do():
     healthy = load("emergency", overrides=[AVERAGE]).without_faults()
     assert sent_by(healthy, world=healthy) != recorded("emergency", AVERAGE).link.sent
+
+
+# --- trust from behaviour and from people: the fault is known to the vehicles only
+
+WRONG = {
+    "a motor": (),
+    "a GPS": ('fault=[{vehicle=5, kind="gps_drift", onset_s=5}]',),
+    "the motor of a leader, who is left behind": ("fault.0.vehicle=1", 'trust.beyond_repair="hold"'),
+}
+SOURCES = [("auto", "a motor"), ("auto", "a GPS"), *(("fused", wrong) for wrong in WRONG)]
+
+
+@pytest.mark.parametrize(("source", "wrong"), SOURCES)
+def test_behaviour_and_people_make_the_same_bytes_whether_or_not_the_ground_station_knows_the_fault(source, wrong):
+    chosen = (*WRONG[wrong], f'trust.source="{source}"')
+    world = load("emergency", overrides=chosen)
+    ratings = schedule("study", world, seed=1) if source == "fused" else None
+    told = recorded("emergency", *chosen, ratings=ratings)
+    assert told.summary.detected.keys() == {str(world.fault[0].vehicle)}
+    assert sent_by(world.without_faults(), world=world, ratings=ratings) == told.link.sent
+
+
+@pytest.mark.parametrize("wrong", ["a motor", "a GPS"])
+def test_truth_does_know_the_fault_and_sends_other_bytes(wrong):
+    """The test above would notice."""
+    world = load("emergency", overrides=WRONG[wrong])
+    assert sent_by(world.without_faults(), world=world) != recorded("emergency", *WRONG[wrong]).link.sent
+
+
+def test_what_people_say_does_change_what_is_sent():
+    world = load("emergency", overrides=['trust.source="fused"'])
+    ratings = schedule("adversarial", world, seed=1)
+    said = recorded("emergency", 'trust.source="fused"', ratings=ratings).link.sent
+    assert said != recorded("emergency", 'trust.source="auto"').link.sent

@@ -6,6 +6,7 @@ import pytest
 from flights import recorded
 from rich.console import Console
 
+from gcs.events import Rating
 from gcs.flight import Flight
 from gcs.loop import fly
 from gcs.progress import MOST_ROWS, Display
@@ -24,14 +25,27 @@ class Turns:
         self.turns.append(tick)
 
 
-@pytest.fixture(scope="module")
-def flight():
-    """Every turn of the emergency, decided again from its recording."""
-    recording, kept = recorded("emergency"), Turns()
-    flight = Flight(recording.scenario)
+def decided_again(recording):
+    """A flight, and every turn of it."""
+    flight, kept = Flight(recording.scenario, ratings=() if recording.read().rated else None), Turns()
     pages = Recorded(list(ticks(recording.path)))
     fly(pages, pages, flight, (kept,), period_ns=recording.scenario.time.period_ns, events=pages.events)
     return flight, kept.turns
+
+
+@pytest.fixture(scope="module")
+def flight():
+    """Every turn of the emergency, decided again from its recording."""
+    return decided_again(recorded("emergency"))
+
+
+@pytest.fixture(scope="module")
+def supervised():
+    """Leader 1 fails for ten seconds, is left behind, and taken back when it is rated 4."""
+    fault, hold = 'fault=[{vehicle=1, kind="motor_degradation", end_s=10}]', 'trust.beyond_repair="hold"'
+    return decided_again(
+        recorded("emergency", 'trust.source="fused"', hold, fault, ratings=(Rating("op1", 1, 4, 12.0),))
+    )
 
 
 def shown(flight, turns, **console):
@@ -67,6 +81,36 @@ def test_on_a_terminal_there_is_a_line_for_every_vehicle(flight):
         [str(system), "leader" if system in (1, 3) else "follower", "offboard"] for system in range(1, 7)
     ]
     assert [row[-1] for row in rows] == ["1.00", "1.00", "1.00", "1.00", "0.00", "1.00"]
+
+
+def parts_shown(supervised, mission_s):
+    """What the column "role" says at a time, vehicle by vehicle."""
+    decided, turns = supervised
+    now = next(turn for turn in turns if turn.diagnosis.mission_s >= mission_s)
+    screen = last_picture(shown(decided, [now], force_terminal=True, width=110, color_system=None))
+    rows = [line for line in screen.splitlines() if line.strip()[:1].isdigit() and "offboard" in line]
+    return [row.partition("offboard")[0].strip()[1:].strip() for row in rows]
+
+
+def test_the_leaders_shown_are_those_who_lead_now_and_who_was_left_behind_is_neither(supervised):
+    follower = ["follower"]
+    assert parts_shown(supervised, 0.5) == ["leader", "follower", "leader", *follower * 3]
+    assert parts_shown(supervised, 3.0) == ["follower", "leader", "leader", *follower * 3]
+    assert parts_shown(supervised, 9.0) == ["left behind", "leader", "leader", *follower * 3]
+    assert parts_shown(supervised, 13.0) == ["follower", "leader", "leader", *follower * 3]
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_who_takes_over_who_is_left_behind_and_who_comes_back_is_said_once(supervised, terminal):
+    screen = shown(*supervised, width=110, force_terminal=terminal, color_system=None)
+    news = [line for line in screen.splitlines() if "robot" in line]
+    assert [line.split("28.0 s")[-1].strip() for line in news] == [
+        "robot 2 leads in place of robot 1", "robot 1 is left behind", "robot 1 is taken back",
+    ]  # fmt: skip
+
+
+def test_where_roles_stay_nothing_is_said_of_them(flight):
+    assert "robot" not in shown(*flight, width=110)
 
 
 def test_before_a_vehicle_is_heard_it_says_so(flight):

@@ -8,12 +8,13 @@ from itertools import pairwise
 import numpy as np
 import orjson
 import pytest
-from flights import fly_and_record, messages, recorded
+from flights import fly_and_record, messages, recorded, told
 from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader, SeekingReader
 from mcap.records import Chunk, Footer
 from mcap.stream_reader import StreamReader
 
+from gcs.events import Rating
 from gcs.recording import topics
 from gcs.recording.reader import UnreadableRecording, read
 from gcs.scoring import score
@@ -123,6 +124,65 @@ def test_every_message_of_ours_is_what_its_schema_says(flight):
                 assert channel.message_encoding == "mavlink"
                 assert schema is None
     assert checked == {"tick", "mission", "trust", "weights", "roles", "setpoint", "swarm", "uav", "truth"}
+
+
+SUPERVISED = (Rating("op1", 5, 1, 12.0), Rating("op2", None, 4, 20.0))
+INTERMITTENT = 'fault=[{vehicle=5, kind="frozen_telemetry", onset_s=3, period_s=8, on_fraction=0.4, end_s=24}]'
+
+
+@pytest.fixture(scope="module")
+def supervised():
+    """A leader fails, passes its role on and is left behind, while people rate."""
+    hold = 'trust.beyond_repair="hold"'
+    return recorded("emergency", 'trust.source="fused"', "fault.0.vehicle=1", hold, ratings=SUPERVISED)
+
+
+@pytest.mark.parametrize("topic", ["/evidence", "/ratings", "/roles"])
+def test_what_trust_was_drawn_from_is_what_its_schema_says(supervised, topic):
+    checked = 0
+    with supervised.path.open("rb") as stream:
+        for schema, _, message in SeekingReader(stream).iter_messages(topics=topic):
+            check(orjson.loads(message.data), orjson.loads(schema.data))
+            checked += 1
+    assert checked == {"/evidence": len(told(supervised, "/mission")), "/ratings": 2, "/roles": 3}[topic]
+
+
+def test_evidence_has_a_number_for_every_vehicle_once_there_is_any(supervised):
+    for content in told(supervised, "/evidence"):
+        for key in ("log_odds", "spoken", "response_m_s", "inconsistency_m", "disagreement_m_s"):
+            assert len(content[key]) == 6
+            assert np.isfinite(content[key]).all()
+
+
+def test_there_is_no_evidence_where_nothing_is_drawn_from_it(flight):
+    assert told(flight, "/evidence") == told(flight, "/ratings") == []
+
+
+def test_a_rating_of_the_swarm_is_recorded_under_its_name(supervised):
+    first, second = told(supervised, "/ratings")
+    assert (first["vehicle"], first["rater"], first["time_s"]) == (5, "op1", pytest.approx(12.0))
+    assert (second["vehicle"], second["rater"], second["time_s"]) == ("swarm", "op2", pytest.approx(20.0))
+
+
+def test_roles_are_told_at_the_start_and_whenever_they_change(supervised):
+    told_roles = [(content["leaders"], content["left_behind"]) for content in told(supervised, "/roles")]
+    assert told_roles == [([1, 3], []), ([2, 3], []), ([2, 3], [1])]
+
+
+def test_a_track_read_back_knows_who_led_and_who_was_left_behind(supervised):
+    parts = supervised.read().track.parts
+    assert [(list(part.leaders), list(part.left_behind)) for part in parts] == [
+        ([1, 3], []), ([2, 3], []), ([2, 3], [1]),
+    ]  # fmt: skip
+    assert [part.time_s for part in parts] == [content["mission_s"] for content in told(supervised, "/roles")]
+
+
+def test_a_fault_that_comes_and_goes_is_told_each_time():
+    faults = told(recorded("emergency", 'trust.source="auto"', INTERMITTENT), "/truth/fault")
+    assert [fault["active"] for fault in faults] == [True, False] * 3
+    assert [fault["mission_s"] for fault in faults] == pytest.approx([3.0, 6.2, 11.0, 14.2, 19.0, 22.2])
+    assert {fault["vehicle"] for fault in faults} == {5}
+    assert faults[0]["definition"]["period_s"] == 8.0
 
 
 KINDS = {
