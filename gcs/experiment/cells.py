@@ -33,6 +33,8 @@ class Cell:
     """Of all faulty vehicles; None where there is nobody to find, or a rule that does not look."""
     detection_s: float | None
     """Median from onset to detection, one never found counting as the longest; None where most are not found."""
+    slowest_s: float | None
+    """The longest from onset to detection, of those that were found."""
     false_alarms: int
     """Healthy vehicles distrusted, added up over the runs."""
     incomplete: int
@@ -92,6 +94,7 @@ def _cell(
         min_separation_m=min(separations, default=None),
         detected=Share.of(min(len(found), faulty), faulty) if faulty else None,
         detection_s=_median(found, faulty),
+        slowest_s=max(found, default=None),
         false_alarms=sum(run.false_alarms for run in runs),
         incomplete=sum(run.problem is not None for run in runs),
         against_reference=against,

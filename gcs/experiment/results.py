@@ -153,6 +153,8 @@ def _found(cell: Cell) -> str:
     if cell.detected is None:
         return "–"
     median = "not found" if cell.detection_s is None else f"{cell.detection_s:.1f} s"
+    if cell.slowest_s is not None and cell.slowest_s != cell.detection_s:
+        median += f", at most {cell.slowest_s:.1f} s"
     return f"{median} ({cell.detected.count}/{cell.detected.n})"
 
 

@@ -564,6 +564,7 @@ def test_the_median_detection_counts_who_was_never_found():
     found = made("a", [1] * 3, faulty=1, detected={5: 2.0}) + made("a", [0] * 2, faulty=1)
     (cell,) = cells(found, reference=None)
     assert (cell.detection_s, cell.detected.count, cell.detected.n) == (2.0, 3, 5)
+    assert cell.slowest_s == 2.0
     (cell,) = cells(found + made("a", [0] * 2, faulty=1), reference=None)
     assert (cell.detection_s, cell.detected.count, cell.detected.n) == (None, 3, 7)
     (cell,) = cells(made("a", [1]), reference=None)
