@@ -31,5 +31,5 @@ def fell_silent(swarm: Swarm, silent: Flags, phase: Phase) -> str:
 
 
 def vehicles(systems: Sequence[int]) -> str:
-    """ "vehicle 5", "vehicles 4, 5"."""
+    """In words: vehicle 5; vehicles 4, 5."""
     return f"{'vehicle' if len(systems) == 1 else 'vehicles'} {', '.join(map(str, systems))}"
