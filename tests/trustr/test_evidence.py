@@ -27,6 +27,7 @@ from trustr.evidence import (
     Evidence,
     neighbourhood,
     shared,
+    spreads,
     trust_of,
     weigh,
 )
@@ -77,8 +78,13 @@ def degraded(commanded, *rows, speed=0.4, offset=0.47, onset_s=ONSET_S, end_s=No
     return obeyed
 
 
-def judged(sample, *, told=None, dt=DT, range_m=RANGE):
+def judged(sample, **how):
     """(T, N) log odds of being faulty, tick by tick."""
+    return np.array([evidence.log_odds for evidence in gathered(sample, **how)])
+
+
+def gathered(sample, *, told=None, dt=DT, range_m=RANGE):
+    """The evidence, tick by tick."""
     chosen, everybody = replace(WATCH, dt=dt), np.ones(sample.velocity_ne.shape[1], bool)
     evidence = Evidence.start(
         chosen,
@@ -86,7 +92,7 @@ def judged(sample, *, told=None, dt=DT, range_m=RANGE):
         position_ne=sample.position_ne[0],
         velocity_ne=sample.velocity_ne[0],
     )
-    odds = [evidence.log_odds]
+    all_of_it = [evidence]
     for tick in range(1, len(sample.velocity_ne)):
         heard = everybody if told is None else told[tick]
         position = sample.position_ne[tick]
@@ -100,8 +106,8 @@ def judged(sample, *, told=None, dt=DT, range_m=RANGE):
             told=heard,
             graph=graph,
         )
-        odds.append(evidence.log_odds)
-    return np.array(odds)
+        all_of_it.append(evidence)
+    return all_of_it
 
 
 def found_after_s(odds, row, *, onset_s=ONSET_S, dt=DT):
@@ -127,7 +133,7 @@ def nobody_is_accused(odds):
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.05, 0.25])
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_healthy_swarm_is_trusted_whatever_the_noise(noise, seed):
     assert nobody_is_accused(judged(flight(commands(seconds=60, seed=seed), noise=noise, seed=seed)))
 
@@ -149,17 +155,30 @@ def test_robots_out_of_each_others_range_are_trusted():
     assert nobody_is_accused(odds)
 
 
-def test_what_all_share_is_nobodys_fault():
+def in_wind(sample, *, onset_s=ONSET_S, drift=(0.6, -0.4)):
     """Air that begins to move: all drift alike, none of them obeys."""
+    begins = round(onset_s / DT)
 
     def blow(velocity):
-        velocity[150:] += (0.6, -0.4)
+        velocity[begins:] += drift
 
     def carry(position):
-        position[150:] += np.arange(1, len(position) - 149)[:, None, None] * DT * np.array([0.6, -0.4])
+        position[begins:] += np.arange(1, len(position) - begins + 1)[:, None, None] * DT * np.array(drift)
 
-    windy = changed(flight(commands(seconds=30), noise=0.05), velocity=blow, position=carry)
-    assert nobody_is_accused(judged(windy))
+    return changed(sample, velocity=blow, position=carry)
+
+
+@pytest.mark.parametrize("drift", [(0.6, -0.4), (0.0, 2.5)])
+def test_what_all_share_is_nobodys_fault(drift):
+    assert nobody_is_accused(judged(in_wind(flight(commands(seconds=30), noise=0.05), drift=drift)))
+
+
+def test_in_wind_that_strikes_all_a_fault_is_found_as_soon_as_in_calm_air():
+    told = commands(seconds=20, straight=True)
+    calm = flight(told, obeyed=degraded(told, 4), noise=0.05)
+    odds = judged(in_wind(calm, onset_s=8.0))
+    assert found_after_s(odds, 4) == pytest.approx(found_after_s(judged(calm), 4), abs=0.3)
+    assert nobody_is_accused(np.delete(odds, 4, axis=1))
 
 
 def test_without_a_graph_robots_are_watched_and_not_judged():
@@ -167,11 +186,74 @@ def test_without_a_graph_robots_are_watched_and_not_judged():
     assert (judged(flight(told, obeyed=degraded(told, 4, onset_s=0.0))) == PRIOR).all()
 
 
+# --- what healthy robots' residuals come to
+
+
+def noisy(*, velocity_m_s=0.0, position_m=0.0, loud=(), seed=0):
+    """Perfect robots whose telemetry is noisy, that of the loud ones five times as much."""
+    sample, rng = flight(commands(seconds=40, straight=True)), np.random.default_rng(seed)
+    louder = np.where(np.isin(np.arange(6), loud), 5.0, 1.0)[:, None]
+    return replace(
+        sample,
+        velocity_ne=sample.velocity_ne + velocity_m_s * louder * rng.standard_normal(sample.velocity_ne.shape),
+        position_ne=sample.position_ne + position_m * louder * rng.standard_normal(sample.position_ne.shape),
+    )
+
+
+def mean_of(values):
+    """Over the last thirty seconds of ticks, and all robots and axes."""
+    return float(np.mean(list(values)[-300:]))
+
+
+def ordered(rank, count):
+    """The mean of the rank-th smallest of so many squared lengths of standard normal vectors in the plane."""
+    return 2.0 * sum(1.0 / (count - below) for below in range(rank))
+
+
+@pytest.mark.parametrize("loud", [(), (1,), (0, 5)])
+def test_noise_of_telemetry_is_measured_and_a_loud_third_of_the_swarm_adds_half_of_it_at_most(loud):
+    """The median of six is the mean of the third and fourth; the quiet ones are the smallest."""
+    quiet = 6 - len(loud)
+    more = (0.5 * (ordered(3, quiet) + ordered(4, quiet)) / (2.0 * np.log(2.0))) ** 0.5
+    ticks = gathered(noisy(velocity_m_s=0.2, position_m=0.1, loud=loud))
+    assert mean_of(tick.velocity_noise for tick in ticks) ** 0.5 == pytest.approx(more * 0.2, rel=0.1)
+    assert mean_of(tick.place_noise for tick in ticks) ** 0.5 == pytest.approx(more * 0.1, rel=0.15)
+    assert more < 1.6
+
+
+@pytest.mark.parametrize(("velocity_m_s", "position_m"), [(0.25, 0.01), (0.01, 0.25), (0.1, 0.1)])
+def test_what_noise_makes_of_the_residuals_is_allowed_for_and_not_much_more(velocity_m_s, position_m):
+    ticks = gathered(noisy(velocity_m_s=velocity_m_s, position_m=position_m))
+    quiet = replace(WATCH, tolerance=0.0, place_tolerance=0.0)
+    allowed = [spreads(tick, quiet) for tick in ticks]
+    response, place = (mean_of(variance[k] for variance in allowed) for k in (0, 1))
+    assert 0.5 * response <= mean_of(tick.residual_ne**2 for tick in ticks) <= response
+    assert 0.5 * place <= mean_of(tick.inconsistency_ne**2 for tick in ticks) <= place
+
+
+@pytest.mark.parametrize("faulty", [(), (4,), (0, 1, 2)])
+def test_gusts_are_measured_as_the_swarms_unrest_whatever_half_the_swarm_does(faulty):
+    """Each robot's own, first-order Gauss–Markov; smoothing takes a part of it, which the residuals show.
+
+    The third of six is taken: among three healthy ones that is the largest.
+    """
+    told, rng, kept = commands(seconds=60), np.random.default_rng(3), exp(-DT / 2.0)
+    sample = flight(told, obeyed=degraded(told, *faulty, onset_s=0.0))
+    gust = 0.2 * rng.standard_normal(told.shape)
+    for before, after in pairwise(range(len(gust))):
+        gust[after] = kept * gust[before] + (1 - kept**2) ** 0.5 * gust[after]
+    ticks = gathered(replace(sample, velocity_ne=sample.velocity_ne + gust))
+    healthy = np.setdiff1d(np.arange(6), faulty)
+    shown = mean_of(tick.residual_ne[healthy] ** 2 for tick in ticks)
+    more = ordered(3, len(healthy)) / ordered(3, 6)
+    assert mean_of(tick.unrest for tick in ticks) == pytest.approx(more * shown, rel=0.3)
+
+
 # --- faults
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.05])
-@pytest.mark.parametrize(("speed", "offset"), [(0.4, 0.47), (0.7, 0.47), (0.4, 0.0), (1.0, 0.47)])
+@pytest.mark.parametrize(("speed", "offset"), [(0.4, 0.47), (0.7, 0.47)])
 def test_the_papers_fault_is_found_within_two_and_a_half_seconds(speed, offset, noise):
     told = commands(seconds=16, straight=True)
     odds = judged(flight(told, obeyed=degraded(told, 4, speed=speed, offset=offset), noise=noise))
@@ -205,12 +287,13 @@ def test_trust_is_regained_as_fast_as_the_constants_let_it():
     assert odds[-1, 4] == pytest.approx(LOWEST)
 
 
-@pytest.mark.parametrize("rows", [(0, 4), (1, 2), (0, 1, 2), (3, 4, 5)])
+@pytest.mark.parametrize("rows", [(1, 4), (0, 1, 2)])
 @pytest.mark.parametrize("speed", [0.4, 0.7])
 def test_up_to_half_the_swarm_failing_alike_is_found_and_nobody_else_is_accused(rows, speed):
-    told = commands(seconds=20)
+    told = commands(seconds=25)
     odds = judged(flight(told, obeyed=degraded(told, *rows, speed=speed), noise=0.05))
     assert max(found_after_s(odds, row) for row in rows) <= 2.5
+    assert (odds[round((ONSET_S + 2.5) / DT) :, rows] > 0.0).all()  # and stays found
     assert nobody_is_accused(np.delete(odds, rows, axis=1))
 
 
