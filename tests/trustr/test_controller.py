@@ -12,9 +12,10 @@ from hypothesis.extra.numpy import arrays
 from gcs.control import settings
 from scenarios import load
 from trustr.consensus import RULES
-from trustr.controller import Observation
+from trustr.controller import Memory, Observation
 from trustr.controller import decide as remember_and_decide
 from trustr.leader import VirtualLeader
+from trustr.roles import Roles
 from trustr.separation import separation
 
 PROFILES = ("paper", "recommended")
@@ -246,3 +247,85 @@ def test_confidence_in_the_first_velocity_fades_from_tick_to_tick():
     later = decide(stopped, REST, chosen, memory)
     assert first.velocity_ne == pytest.approx(begun.velocity_ne)
     assert later.velocity_ne == pytest.approx(0.9 * exp(-0.5 * 2.0) * begun.velocity_ne)
+
+
+# --- parts that trust gives and takes
+
+
+def remembering(chosen, *, left=(), leaders=None):
+    """A memory in which these robots were left behind, and these lead."""
+    six = np.arange(6)
+    roles = replace(Roles.of(6, chosen.leaders if leaders is None else np.array(leaders)), left=np.isin(six, left))
+    return Memory(0.0, np.zeros((6, 2)), np.zeros(6), roles)
+
+
+@rules
+@given(observations(), st.sets(st.integers(0, 5), min_size=1))
+def test_between_others_and_a_robot_left_behind_the_weight_is_exactly_zero(rule, observation, left):
+    chosen = flown_by(rule, "recommended")
+    decision = decide(replace(observation, time_s=0.1), VIRTUAL, chosen, remembering(chosen, left=list(left)))
+    matrix = decision.graph.dense(decision.weights)
+    away = np.isin(np.arange(6), list(left))
+    assert not (matrix * ~np.eye(6, dtype=bool))[:, away].any()
+    assert matrix.sum(1) == pytest.approx(1, abs=1e-12)
+    assert np.isfinite(decision.velocity_ne).all()
+
+
+@profiles
+def test_the_others_still_keep_apart_from_a_robot_left_behind(profile):
+    chosen = replace(SETTINGS[profile], c1=0.0, c2=0.0, formation_gain=0.0)
+    seen = in_formation(chosen)
+    seen.position_ne[4] = seen.position_ne[5] + [-1.0, 0.0]
+    command = decide(seen, REST, chosen, remembering(chosen, left=[4])).velocity_ne
+    assert command[5, 0] == pytest.approx(chosen.separation_gain * (chosen.separation_radius - 1.0))
+
+
+def test_a_robot_left_behind_is_left_after_fifty_ticks_without_hope():
+    chosen, memory = SETTINGS["recommended"], None
+    chosen = replace(chosen, leave_behind=True)
+    trust = np.where(np.arange(6) == 4, 0.0, 1.0)
+    left = []
+    for tick in range(60):
+        seen = replace(in_formation(chosen), trust=trust, time_s=tick * 0.1)
+        memory, decision = remember_and_decide(memory, seen, REST, chosen)
+        left.append(decision.roles.left.tolist())
+    assert not np.any(left[:50])
+    assert left[50:] == [[False] * 4 + [True, False]] * 10
+
+
+@profiles
+def test_who_takes_a_leaders_role_is_steered_in_its_stead(profile):
+    chosen = replace(SETTINGS[profile], hand_over=True, eta=0.0, berth=0.0)
+    ahead = VirtualLeader(np.array([1.0, 0.0]), np.zeros(2), np.zeros(2))
+    trust = np.array([0.0, 1, 1, 1, 1, 1])
+    decision = decide(replace(in_formation(chosen), trust=trust), ahead, chosen)
+    assert decision.roles.leaders.tolist() == [1, 2]
+    assert decision.velocity_ne[[1, 2], 0] == pytest.approx(chosen.c1)
+    assert not decision.velocity_ne[[0, 3, 4, 5]].any()
+
+
+@profiles
+def test_where_all_leaders_are_left_behind_nobody_is_steered(profile):
+    chosen = replace(SETTINGS[profile], hand_over=False, formation_gain=0.0)
+    ahead = VirtualLeader(np.array([9.0, 0.0]), np.zeros(2), np.ones(2))
+    command = decide(in_formation(chosen), ahead, chosen, remembering(chosen, left=[0, 2])).velocity_ne
+    assert command == pytest.approx(np.zeros((6, 2)), abs=1e-12)
+
+
+def test_the_robot_behind_one_that_is_left_is_drawn_into_its_place():
+    chosen = replace(SETTINGS["recommended"], c1=0.0, c2=0.0)
+    command = decide(in_formation(chosen), REST, chosen, remembering(chosen, left=[1])).velocity_ne
+    gap = chosen.offset_ne[1] - chosen.offset_ne[4]
+    assert command[4] == pytest.approx(chosen.formation_gain * (1 - 1 / 5) * gap, rel=0.01)
+    assert not command[1].any()
+
+
+@profiles
+@pytest.mark.parametrize("trust", [0.0, 1.0])
+@pytest.mark.parametrize("rule", ["average", "trust-r", "median", "wmsr-1", "wmsr-2"])
+def test_a_follower_out_of_everyones_range_flies_on(profile, rule, trust):
+    chosen = flown_by(rule, profile)
+    seen = in_formation(chosen, velocity=(1.0, -0.5))
+    seen.position_ne[4] += 1e4
+    seen.trust[4] = trust
+    assert decide(seen, REST, replace(chosen, hand_over=False)).velocity_ne[4] == pytest.approx([1.0, -0.5])
