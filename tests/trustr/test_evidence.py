@@ -247,6 +247,7 @@ def test_gusts_are_measured_as_the_swarms_unrest_whatever_half_the_swarm_does(fa
     shown = mean_of(tick.residual_ne[healthy] ** 2 for tick in ticks)
     more = ordered(3, len(healthy)) / ordered(3, 6)
     assert mean_of(tick.unrest for tick in ticks) == pytest.approx(more * shown, rel=0.3)
+    assert mean_of(spreads(tick, WATCH)[0] for tick in ticks) > WATCH.tolerance**2 + 0.7 * shown
 
 
 # --- faults
