@@ -13,7 +13,7 @@ from rich.text import Text
 from gcs.recording.reader import Flown, UnreadableRecording, located, read
 from gcs.scoring import Score, score
 from gcs.summary import trust_of
-from gcs.words import faults
+from gcs.words import faults, robots
 
 FORMATS = (".png", ".pdf", ".svg")
 
@@ -55,8 +55,9 @@ def _table(flights: Sequence[Flown]) -> Table:
         table.add_row(words, *("–" if s is None else form.format(getattr(s, name)) for s in scores))
     table.add_row("what goes wrong", *(Text(", ".join(faults(flight.scenario)) or "nothing") for flight in flights))
     table.add_row("distrusted after", *map(_found, flights, scores))
-    if any(map(_left_behind, flights)):
-        table.add_row("left behind", *(_robots(_left_behind(flight)) for flight in flights))
+    left = [_left_behind(flight) for flight in flights]
+    if any(left):
+        table.add_row("left behind", *(robots(systems) if systems else "nobody" for systems in left))
     table.add_row("mission", *map(_verdict, flights, scores))
     return table
 
@@ -72,10 +73,6 @@ def _found(flight: Flown, result: Score | None) -> str:
 
 def _left_behind(flight: Flown) -> tuple[int, ...]:
     return flight.track.parts[-1].left_behind if flight.track is not None and flight.track.parts else ()
-
-
-def _robots(systems: Sequence[int]) -> str:
-    return f"robot {', '.join(map(str, systems))}" if systems else "nobody"
 
 
 def _verdict(flight: Flown, result: Score | None) -> Text:

@@ -19,10 +19,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from gcs.mission import Plan, plan
-from gcs.scoring import DISTRUSTED, Score, score
+from gcs.scoring import DISTRUSTED, Score, score, scored_robots
 from gcs.summary import trust_of
 from gcs.track import Parts, Track
-from gcs.words import faults
+from gcs.words import faults, robots
 from scenarios import Scenario, healthy_robots, offsets_ne
 
 HEALTHY = ("#1f4e8c", "#2a7fba", "#3aa6a0", "#5b8def", "#6a7fb5", "#2c9c6a")
@@ -121,7 +121,7 @@ def _map(axes: Any, panel: Panel, window: Window) -> None:
     parts = _parts(track, scenario)
     for row in range(scenario.swarm.count):
         _draw_robot(axes, row, track, _colour(row, scenario), parts)
-    scored = _scored(scenario)
+    scored = scored_robots(scenario)
     mean = (track.position[:, scored, :2] - offsets_ne(scenario)[scored]).mean(axis=1)
     axes.plot(mean[:, 1], mean[:, 0], color="black", lw=2.4, zorder=4)
     axes.plot(mean[-1, 1], mean[-1, 0], "D", color="black", ms=5, mec="white", zorder=7.5)
@@ -168,12 +168,6 @@ def _where(among: Flags, values: Any) -> Any:
 
 def _colour(row: int, scenario: Scenario) -> str:
     return HEALTHY[row % len(HEALTHY)] if healthy_robots(scenario)[row] else FAILED
-
-
-def _scored(scenario: Scenario) -> Flags:
-    """(N,) the healthy; where nobody is, all."""
-    healthy = healthy_robots(scenario)
-    return healthy if healthy.any() else ~healthy
 
 
 def _parts(track: Track, scenario: Scenario) -> tuple[Parts, ...]:
@@ -290,7 +284,7 @@ def _turns(parts: Sequence[Parts]) -> Iterator[tuple[float, float, str]]:
 
 
 def _legend(panels: Sequence[Panel]) -> list[Line2D | Patch]:
-    faulty = sorted({row + 1 for panel in panels for row in np.flatnonzero(~healthy_robots(panel.scenario))})
+    faulty = sorted({int(row) + 1 for panel in panels for row in np.flatnonzero(~healthy_robots(panel.scenario))})
     left = any(part.left_behind for panel in panels for part in panel.track.parts)
     nobodys = any(fault.blamed is None for panel in panels for fault in panel.scenario.fault)
     handles: list[Line2D | Patch] = [
@@ -300,7 +294,7 @@ def _legend(panels: Sequence[Panel]) -> list[Line2D | Patch]:
         Line2D([], [], color=HEALTHY[1], marker="^", mec="white", ms=8, lw=0, label="leaders at the end"),
     ]
     if faulty:
-        names = f"failed robot{'s' if len(faulty) > 1 else ''} {', '.join(map(str, faulty))}"
+        names = f"failed {robots(faulty)}"
         handles.append(Line2D([], [], color=FAILED, marker="X", mec="white", ms=9, lw=2, label=names))
         handles.append(Patch(color=FAULT, label="a fault acts"))
     if nobodys:

@@ -46,13 +46,11 @@ def score(track: Track, scenario: Scenario) -> Score | None:
     if track.time_s[-1] < path.read_out_s - 1e-9:
         return None
     hand_over, read_out = (int(np.searchsorted(track.time_s, t - 1e-9)) for t in (path.hand_over_s, path.read_out_s))
-    healthy = healthy_robots(scenario)
-    if not healthy.any():
-        healthy = ~healthy  # nobody is left to be scored alone: score all
+    healthy, scored = healthy_robots(scenario), scored_robots(scenario)
     place = track.position[..., :2] - offsets_ne(scenario)
     leg = path.segments[-1].velocity_ne
-    error = abs(heading_error(place[hand_over, healthy].mean(0), place[read_out, healthy].mean(0), leg))
-    distance = float(np.linalg.norm(place[read_out, healthy].mean(0) - path.target_ne))
+    error = abs(heading_error(place[hand_over, scored].mean(0), place[read_out, scored].mean(0), leg))
+    distance = float(np.linalg.norm(place[read_out, scored].mean(0) - path.target_ne))
     separation = min_separation(track.position[: read_out + 1])
     expect = scenario.expect
     return Score(
@@ -68,6 +66,12 @@ def score(track: Track, scenario: Scenario) -> Score | None:
         detected=_detected(track, scenario),
         false_alarms=int((track.trust[:, healthy] < DISTRUSTED).any(axis=0).sum()),
     )
+
+
+def scored_robots(scenario: Scenario) -> npt.NDArray[np.bool_]:
+    """(N,) whom a flight is judged by: the healthy; where nobody is, all."""
+    healthy = healthy_robots(scenario)
+    return healthy if healthy.any() else ~healthy
 
 
 def heading_error(start_ne: Array, end_ne: Array, wanted_ne: Array) -> float:

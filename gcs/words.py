@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from gcs.summary import Summary
 from scenarios import (
@@ -74,6 +74,11 @@ def _when(fault: Fault) -> Iterator[str]:
         yield f"until {fault.end_s:g} s"
 
 
+def robots(systems: Sequence[int]) -> str:
+    """In words: robot 5; robots 2, 5."""
+    return f"{'robot' if len(systems) == 1 else 'robots'} {', '.join(map(str, systems))}"
+
+
 def verdict(summary: Summary) -> str:
     """Two or three lines: what was flown, and how it ended."""
     trust = "" if summary.trust is None else f", trust from {summary.trust}"
@@ -82,7 +87,7 @@ def verdict(summary: Summary) -> str:
         return f"{flight}\nended before its read-out: no score"
     closest = summary.min_separation_m
     apart = "" if math.isinf(closest) else f", robots never closer than {closest:.1f} m"
-    without = f", without robot {', '.join(map(str, summary.left_behind))}" if summary.left_behind else ""
+    without = f", without {robots(summary.left_behind)}" if summary.left_behind else ""
     on = "" if summary.scored_on == "truth" else " (by telemetry: no truth was told)"
     return (
         f"{flight}\n{'passed' if summary.passed else 'failed'}: heading off by {summary.heading_error_deg:.1f}°, "

@@ -147,6 +147,13 @@ def test_each_healthy_robot_distrusted_at_any_tick_is_one_false_alarm():
     assert result.detected == {}
 
 
+def test_where_everybody_fails_distrust_is_no_false_alarm_and_all_are_scored():
+    alone = load("transit", overrides=["swarm.rows=1", "swarm.columns=1", "swarm.leaders=[1]", "fault.0.vehicle=1"])
+    result = score(distrusted(ideal(alone), 1, 2.0), alone)
+    assert (result.detected, result.false_alarms) == ({1: pytest.approx(2.0)}, 0)
+    assert result.distance_to_target_m == pytest.approx(0.0, abs=1e-9)
+
+
 def test_healthy_is_whom_no_fault_ever_strikes():
     assert healthy_robots(TRANSIT).tolist() == [True, True, True, True, False, True]
     assert healthy_robots(DEMO).all()

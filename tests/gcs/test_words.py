@@ -1,8 +1,11 @@
 """What goes wrong, in plain words."""
 
-import pytest
+from dataclasses import replace
 
-from gcs.words import faults
+import pytest
+from flights import SHORT, recorded
+
+from gcs.words import faults, verdict
 from scenarios import load
 
 
@@ -47,3 +50,10 @@ def test_each_kind_is_named_with_what_matters_of_its_severity(kind, keys, words)
 )
 def test_when_it_comes_and_goes_is_said_where_it_is_not_always_there(keys, words):
     assert said(kind='"frozen_telemetry"', **keys) == f"telemetry of robot 5 frozen ({words})"
+
+
+def test_a_verdict_says_whom_the_swarm_went_on_without():
+    summary = recorded("demo", *SHORT).summary
+    assert "without" not in verdict(summary)
+    assert ", without robot 5" in verdict(replace(summary, left_behind=[5]))
+    assert ", without robots 2, 5" in verdict(replace(summary, left_behind=[2, 5]))
