@@ -38,8 +38,8 @@ RATIO = 3.75
 """σ_f / σ_h: how much further than healthy robots faulty ones stray."""
 SMOOTHING_S = 0.3
 """Low pass of the residuals."""
-NOISE_MEMORY_S = 1.0
-"""Low pass of the estimated variance of telemetry noise."""
+NOISE_RISE_S, NOISE_FALL_S = 0.3, 1.0
+"""Low pass of the estimated variance of telemetry noise: noise that sets in must not be taken for faults meanwhile."""
 UNREST_MEMORY_S = 2.0
 """Low pass of the variance that most robots show."""
 PLACE_MEMORY_S = 1.0
@@ -139,14 +139,14 @@ def weigh(
     """
     commanded = np.concatenate([evidence.commanded_ne[1:], commanded_ne[None]])
     expected = follow(watch.response, evidence.expected, commanded, dt=watch.dt)
-    smooth, remember = _share(SMOOTHING_S, watch.dt), _share(NOISE_MEMORY_S, watch.dt)
+    smooth = _share(SMOOTHING_S, watch.dt)
 
     off = velocity_ne - expected.velocity_ne
     believable = capped(off, WILDEST)
     raw = _update(evidence.raw_ne, believable, told)
     own = raw - shared(raw, told)
     residual = _update(evidence.residual_ne, evidence.residual_ne + smooth * (own - evidence.residual_ne), told)
-    velocity_noise = _noise(evidence.velocity_noise, raw - evidence.raw_ne, told, remember)
+    velocity_noise = _noise(evidence.velocity_noise, raw - evidence.raw_ne, told, watch.dt)
 
     # one wild velocity must not carry the prediction off; and who is silent flies on as healthy robots would
     flown = _update(expected.velocity_ne, velocity_ne - (off - believable), told)
@@ -155,7 +155,7 @@ def weigh(
     strayed = _update(evidence.strayed_ne, capped(position_ne - predicted, WILDEST), told)
     predicted = _update(predicted, predicted + _share(PLACE_MEMORY_S, watch.dt) * strayed, told)
     inconsistency = evidence.inconsistency_ne + smooth * (strayed - evidence.inconsistency_ne)
-    place_noise = _noise(evidence.place_noise, strayed - evidence.strayed_ne, told, remember)
+    place_noise = _noise(evidence.place_noise, strayed - evidence.strayed_ne, told, watch.dt)
 
     watched = replace(
         evidence,
@@ -263,12 +263,12 @@ def _update(before: Array, after: Array, told: Flags) -> Array:
     return after if told.all() else np.where(told[:, None], after, before)
 
 
-def _noise(before: float, step: Array, told: Flags, remember: float) -> float:
+def _noise(before: float, step: Array, told: Flags, dt: float) -> float:
     """Variance of white noise from residuals' steps (N, 2): the median robot's, so that a faulty few do not count."""
     if not told.any():
         return before
     variance = float(np.median(np.einsum("ij,ij->i", step, step)[told])) / (2.0 * MEDIAN_CHI2)
-    return before + remember * (variance - before)
+    return before + _share(NOISE_RISE_S if variance > before else NOISE_FALL_S, dt) * (variance - before)
 
 
 def _unrest(residual_ne: Array, told: Flags) -> float:

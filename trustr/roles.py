@@ -56,7 +56,7 @@ def hand_over(roles: Roles, *, trust: Array, heard: Flags, offset_ne: Array) -> 
 
 
 def leave_behind(roles: Roles, *, trust: Array, dt: float) -> Roles:
-    """Count for how long each robot has been hopeless; those beyond PATIENCE_S are left behind, for good."""
+    """Count for how long each robot has been hopeless; to a tick; after PATIENCE_S it is left, for good."""
     hopeless_s = np.where(trust < HOPELESS, roles.hopeless_s + dt, 0.0)
     return replace(roles, hopeless_s=hopeless_s, left=roles.left | (hopeless_s >= PATIENCE_S - 1e-9))
 
