@@ -2,7 +2,6 @@
 
 `truth` is the simulation's own knowledge of the faults; `auto` what the swarm's behaviour shows; `ratings` what people
 say of it, and where nobody says anything the user study's mean ratings; `fused` is `auto` and `ratings` together.
-Before the mission every robot is trusted.
 """
 
 from __future__ import annotations
@@ -63,6 +62,8 @@ class Seen:
     """(N,) when both arrived."""
     heard: Flags
     """(N,) fresh, and under our control."""
+    left: Flags
+    """(N,) left behind: nobody learns from them or judges them any more."""
     ratings: Sequence[Rating]
     """What was said since."""
 
@@ -90,23 +91,24 @@ class Beliefs:
     def update(self, belief: Belief, seen: Seen) -> Belief:
         """What is believed after one more tick."""
         spoken = aged(belief.spoken, dt=self._watch.dt, age_out_s=self._scenario.trust.age_out_s)
+        belief = replace(belief, spoken=spoken)
         for rating in seen.ratings if self._listens else ():
             row = None if rating.vehicle is None else rating.vehicle - 1
             suspicion = 1.0 - trust_of(self._odds(belief))
-            spoken = told(spoken, suspicion, rating.rating, row, cap=self._cap)
-            belief = replace(belief, spoken=spoken)
-        return self._watched(replace(belief, spoken=spoken), seen) if self._watches else replace(belief, spoken=spoken)
+            belief = replace(belief, spoken=told(belief.spoken, suspicion, rating.rating, row, cap=self._cap))
+        return self._watched(belief, seen) if self._watches else belief
 
     def trust(self, belief: Belief, mission_s: float) -> Array:
-        """(N,) in [0, 1] at this time since mission start."""
+        """(N,) in [0, 1] at this time since mission start; NaN is before it."""
         if self._source == "truth":
             return self._truth(mission_s)
         if self._source == "ratings" and not self._listens:
-            return self._study
+            return np.ones_like(self._study) if np.isnan(mission_s) else self._study
         return trust_of(self._odds(belief))
 
     def forgive(self, belief: Belief, robots: Flags) -> Belief:
-        """Of these robots (N,), think as of robots nothing is known of."""
+        """Of these robots (N,), think as of robots nothing is known of, and nothing was said."""
+        belief = replace(belief, spoken=np.where(robots, 0.0, belief.spoken))
         if belief.evidence is None:
             return belief
         odds = np.where(robots, PRIOR, belief.evidence.log_odds)
@@ -119,7 +121,7 @@ class Beliefs:
         return belief.spoken + (PRIOR if self._watches else UNTOLD)
 
     def _watched(self, belief: Belief, seen: Seen) -> Belief:
-        here = seen.heard & np.isfinite(seen.position_ne).all(1) & np.isfinite(seen.velocity_ne).all(1)
+        here = seen.heard & ~seen.left & np.isfinite(seen.position_ne).all(1) & np.isfinite(seen.velocity_ne).all(1)
         if belief.evidence is None:
             if not here.all():
                 return belief

@@ -6,6 +6,7 @@ import numpy as np
 
 from gcs.rules import rehearse, rule
 from scenarios import Scenario, offsets_ne
+from scenarios.models import RULES
 from trustr.controller import Settings
 
 BERTH = 3.0
@@ -16,8 +17,8 @@ FORMATION_GAIN = 0.3
 """1/s: how fast `recommended` lets robots return to their place among those they trust."""
 
 
-HEEDLESS = ("average", "median", "wmsr-1", "wmsr-2", "confidence-decay")
-"""Baselines: what trust does besides weighing, hand-over and leaving behind, is no part of them."""
+BASELINES = frozenset(RULES) - {"trust-r"}
+"""What trust does besides weighing (hand-over, leaving behind, a wide berth) is no part of the rules of others."""
 
 
 def settings(scenario: Scenario) -> Settings:
@@ -31,8 +32,8 @@ def settings(scenario: Scenario) -> Settings:
         offset_ne=offsets_ne(scenario),
         files=tuple(np.arange(swarm.count).reshape(swarm.rows, swarm.columns).T),
         leaders=np.array(swarm.leaders) - 1,
-        hand_over=scenario.trust.hand_over and control.rule not in HEEDLESS,
-        leave_behind=scenario.trust.beyond_repair != "keep" and control.rule not in HEEDLESS,
+        hand_over=scenario.trust.hand_over and control.rule not in BASELINES,
+        leave_behind=scenario.trust.beyond_repair != "keep" and control.rule not in BASELINES,
         c1=control.c1 * slower,
         c2=control.c2 * slower,
         feedback_cap=control.feedback_cap * slower * cruise,
@@ -57,8 +58,8 @@ def settings(scenario: Scenario) -> Settings:
 
 
 def _berth(scenario: Scenario) -> float:
-    """The berth of distrusted robots [m]; rules that know no trust give none."""
-    if scenario.control.rule in HEEDLESS:
+    """The berth of distrusted robots [m]; baselines give none."""
+    if scenario.control.rule in BASELINES:
         return 0.0
     if scenario.control.berth_m is not None:
         return scenario.control.berth_m

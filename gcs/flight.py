@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from gcs import losses, mission
+from gcs import leaving, losses, mission
 from gcs.autopilots import Px4
 from gcs.beliefs import Beliefs, Seen
 from gcs.commands import Beat, Command, SetVelocity
@@ -36,7 +36,6 @@ from gcs.telemetry import Swarm
 from scenarios import Scenario, offsets_ne
 from trustr.controller import Decision, Observation, decide
 from trustr.leader import VirtualLeader, capped
-from trustr.network import nearest
 from trustr.roles import taken_back
 
 Array = npt.NDArray[np.float64]
@@ -58,12 +57,6 @@ HEIGHT_GAIN, CLIMB_SPEED = 0.8, 1.0
 """1/s and m/s: altitude is held apart from the consensus."""
 TOLD_S = 2.0
 """A heartbeat is a second apart: what it says is believed this long after it may have changed."""
-TAKES_BACK = 4
-"""A rating from which the supervisor wants a robot back that was left behind."""
-BELOW = 3.0
-"""m under the others: where robots go that are left behind."""
-CLEAR = 3.0
-"""m, horizontal: nobody this close is above a robot that climbs back."""
 RUN_UP_GAIN, RUN_UP_CAP = 0.5, 0.5
 """1/s and m/s: every robot to its place beside the moving origin."""
 
@@ -125,7 +118,12 @@ class Flight:
 
     def _due(self, state: FlightState) -> tuple[Rating, ...]:
         """Ratings known beforehand that count at this tick."""
+        if self._opens_the_mission(state):
+            return self._schedule.get(0, ())
         return () if state.mission_tick is None else self._schedule.get(state.tick - state.mission_tick, ())
+
+    def _opens_the_mission(self, state: FlightState) -> bool:
+        return state.phase is Phase.RUN_UP and state.tick - state.phase_tick >= self._run_up_ticks
 
     def _believe(self, state: FlightState, swarm: Swarm, said: tuple[Rating, ...], now_ns: int) -> FlightState:
         """Weigh what the tick shows; who was left behind is taken back where the supervisor says so."""
@@ -136,14 +134,15 @@ class Flight:
             velocity_ne=swarm.velocity_ned[:, :2],
             position_ns=swarm.position_ns,
             heard=self._autopilot.obeying(swarm) & swarm.fresh(now_ns, within_ns=STALE_NS),
+            left=state.memory.roles.left if state.memory else np.zeros(len(swarm.ids), bool),
             ratings=said,
         )
         state = replace(state, belief=self._beliefs.update(state.belief, seen))
-        praised_ids = {rating.vehicle for rating in said if rating.rating >= TAKES_BACK}
-        praised = np.array([system in praised_ids for system in self.ids])
-        if state.memory is None or not (praised & state.memory.roles.left).any():
+        if state.memory is None or state.phase is not Phase.MISSION:
             return state
-        wanted = praised & state.memory.roles.left
+        wanted = leaving.wanted_back(said, state.memory.roles, swarm, seen.heard)
+        if not wanted.any():
+            return state
         memory = replace(state.memory, roles=taken_back(state.memory.roles, wanted))
         return replace(state, memory=memory, belief=self._beliefs.forgive(state.belief, wanted))
 
@@ -207,7 +206,7 @@ class Flight:
     def _run_up(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
         """Bring the formation to cruise: time 0 finds it where the first leg begins, each robot in its place."""
         into = state.tick - state.phase_tick
-        if into >= self._run_up_ticks:
+        if self._opens_the_mission(state):
             state = replace(entered(state, Phase.MISSION), mission_tick=state.tick)
             return self._mission(state, swarm, now_ns)
         cruise = self.scenario.mission.cruise_m_s
@@ -247,22 +246,17 @@ class Flight:
         decision: Decision,
         commanded: npt.NDArray[np.bool_],
     ) -> Step:
-        """Steer; who was left behind sinks below the others while it goes along with them, and only there it stops.
-
-        Who was taken back climbs once nobody is above it.
-        """
-        left, altitude_m = decision.roles.left, self.scenario.swarm.altitude_m
-        below = -swarm.position_ned[:, 2] < altitude_m - 0.8 * BELOW
-        commands: Commands = []
+        """Steer the swarm, and those who leave it or come back to it out of its way."""
+        roles, commands = decision.roles, list[tuple[int, Command]]()
         if self.scenario.trust.beyond_repair == "land":
             state, commands, _ = self._ask(
-                state, swarm, lambda row: _some(self._autopilot.next_to_land(swarm, row)) if (left & below)[row] else ()
+                state, swarm, lambda row: _some(self._autopilot.next_to_land(swarm, row)) if roles.gone[row] else ()
             )
-            commanded = commanded & ~(left & below)
-        blocked = below & (nearest(diagnosis.position_ne) < CLEAR)
-        velocity = np.where((left & below)[:, None], 0.0, decision.velocity_ne)
-        lower = np.where(left | blocked, BELOW, 0.0)
-        state, steering, diagnosis = self._steer(state, swarm, velocity, diagnosis, decision, commanded, lower=lower)
+            commanded = commanded & ~roles.gone
+        lower = leaving.lowered(roles, swarm, diagnosis.position_ne)
+        state, steering, diagnosis = self._steer(
+            state, swarm, decision.velocity_ne, diagnosis, decision, commanded, lower=lower
+        )
         return state, commands + steering, diagnosis
 
     def _land(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
@@ -307,6 +301,8 @@ class Flight:
         down = np.clip(-HEIGHT_GAIN * height_error, -CLIMB_SPEED, CLIMB_SPEED)
         asked = np.empty_like(swarm.position_ned)
         asked[:, :2], asked[:, 2] = velocity_ne, down
+        if decision is not None and decision.roles.gone.any():
+            asked = leaving.settled(asked, decision.roles)
         sent, verdict = admit(asked, state.sent_ned, self._limits, dt=self._period_s)
         if commanded is None:
             commanded = np.ones(len(swarm.ids), bool)
@@ -339,15 +335,15 @@ class Flight:
     def _overview(self, state: FlightState, swarm: Swarm) -> Diagnosis:
         """What every phase has to say."""
         position, time_s = self._position_ne(state, swarm), self._mission_s(state)
+        trust = self._beliefs.trust(state.belief, time_s)
         if math.isnan(time_s):
-            trust = np.ones(len(swarm.ids))
             return Diagnosis(state.phase, time_s, self.plan.segments[0].task, None, trust, None, position)
         return Diagnosis(
             phase=state.phase,
             mission_s=time_s,
             task=self.plan.segment_at(time_s).task,
             virtual=self._leader(self.plan, time_s),
-            trust=self._beliefs.trust(state.belief, time_s),
+            trust=trust,
             decision=None,
             position_ne=position,
             belief=state.belief,

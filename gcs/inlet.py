@@ -23,7 +23,7 @@ LINE, BUFFER = 1024, 4096
 """Bytes: the longest line, and what of one client may wait for its turn."""
 LINES_A_TICK = 8
 """Of one client; the others wait for the next tick."""
-HTTP = re.compile(rb"[A-Z]+ \S* HTTP/[\d.]+")
+HTTP = re.compile(rb"[A-Z]+ (/|http)")
 
 
 class Conversation:
@@ -94,11 +94,11 @@ class Conversation:
         return line if line or end else None
 
     def _understood(self, line: bytes) -> Rating:
-        if len(line) > LINE:
-            raise RatingsError(f"this line is too long: at most {LINE} bytes make a rating")
         if HTTP.match(line):  # a browser that some web page sent here: what follows is not a person's rating
             self._incoming, self._ended = b"", True
             raise RatingsError("this is no web server: one rating a line, and nothing else")
+        if len(line) > LINE:
+            raise RatingsError(f"this line is too long: at most {LINE} bytes make a rating")
         return parse(line, count=self._count, live=True)
 
     def _answer(self, answer: dict[str, object]) -> None:

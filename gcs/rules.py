@@ -68,7 +68,7 @@ def _watched(name: str, function: Callable[..., Any]) -> Rule:
     def watched(heard: Heard, settings: Settings) -> Agreement:
         try:
             answer = function(_sealed(heard), settings)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             within = traceback.extract_tb(error.__traceback__)[1:2]
             place = f" at {Path(within[0].filename).name}:{within[0].lineno}" if within else ""
             raise _refusal(name, f"it raised {_in_a_line(error)}{place}") from error

@@ -37,7 +37,7 @@ class Score:
     detected: dict[int, float]
     """Seconds from a fault's onset until the vehicle's trust fell below 0.5, of those that were found."""
     false_alarms: int
-    """Healthy vehicles whose trust was below 0.5 at any time."""
+    """Vehicles whose trust was below 0.5 at any time before a fault of theirs, if they had one."""
 
 
 def score(track: Track, scenario: Scenario) -> Score | None:
@@ -46,7 +46,7 @@ def score(track: Track, scenario: Scenario) -> Score | None:
     if track.time_s[-1] < path.read_out_s - 1e-9:
         return None
     hand_over, read_out = (int(np.searchsorted(track.time_s, t - 1e-9)) for t in (path.hand_over_s, path.read_out_s))
-    healthy, scored = healthy_robots(scenario), scored_robots(scenario)
+    scored = scored_robots(scenario)
     place = track.position[..., :2] - offsets_ne(scenario)
     leg = path.segments[-1].velocity_ne
     error = abs(heading_error(place[hand_over, scored].mean(0), place[read_out, scored].mean(0), leg))
@@ -64,7 +64,7 @@ def score(track: Track, scenario: Scenario) -> Score | None:
             and separation >= expect.min_separation_m
         ),
         detected=_detected(track, scenario),
-        false_alarms=int((track.trust[:, healthy] < DISTRUSTED).any(axis=0).sum()),
+        false_alarms=int(((track.trust < DISTRUSTED) & _sound(track, scenario)).any(axis=0).sum()),
     )
 
 
@@ -72,6 +72,15 @@ def scored_robots(scenario: Scenario) -> npt.NDArray[np.bool_]:
     """(N,) whom a flight is judged by: the healthy; where nobody is, all."""
     healthy = healthy_robots(scenario)
     return healthy if healthy.any() else ~healthy
+
+
+def _sound(track: Track, scenario: Scenario) -> npt.NDArray[np.bool_]:
+    """(T, N) who has had no fault yet: what is held against it is a false alarm."""
+    onset_s = np.full(scenario.swarm.count, np.inf)
+    for fault in scenario.fault:
+        if fault.blamed is not None:
+            onset_s[fault.blamed - 1] = min(onset_s[fault.blamed - 1], fault.onset_s)
+    return np.asarray(track.time_s[:, None] < onset_s - 1e-9)
 
 
 def heading_error(start_ne: Array, end_ne: Array, wanted_ne: Array) -> float:

@@ -9,6 +9,7 @@ import orjson
 
 from gcs.scoring import CONTACT
 from scenarios import MotorDegradation, Scenario
+from scenarios.models import RULES as ASKS_FOR_TRUST
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +70,7 @@ def severity_of(scenario: Scenario) -> float | None:
 
 def trust_of(scenario: Scenario) -> str | None:
     """Where trust comes from, if the rule uses it."""
-    return None if scenario.control.rule in ("average", "median", "wmsr-1", "wmsr-2") else scenario.trust.source
+    return scenario.trust.source if ASKS_FOR_TRUST.get(scenario.control.rule, True) else None
 
 
 def collision(closest_m: float | None) -> str | None:

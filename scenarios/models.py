@@ -118,8 +118,15 @@ class Redirect(Section):
     length_m: Positive
 
 
-RULES = ("average", "trust-r", "median", "wmsr-1", "wmsr-2", "confidence-decay")
-"""Update rules that ship: eq. 1 and eq. 12 of the paper, and the baselines (`trustr/consensus.py`)."""
+RULES = {
+    "average": False,
+    "trust-r": True,
+    "median": False,
+    "wmsr-1": False,
+    "wmsr-2": False,
+    "confidence-decay": True,
+}
+"""Update rules that ship (`trustr/consensus.py`), and whether they ask for trust."""
 
 
 class Control(Section):

@@ -127,7 +127,7 @@ def decide(
     position, velocity = _of_the_heard(observation.position_ne, heard), _of_the_heard(observation.velocity_ne, heard)
     memory = _remembered(memory, observation, velocity, heard, settings)
     roles, left = memory.roles, memory.roles.left
-    around = neighbours(position, heard, range_m=settings.range_m)
+    around = neighbours(position, heard, range_m=settings.range_m).without(roles.gone)
     graph = around.without(left)
     agreement = settings.rule(
         Heard(graph, velocity, observation.trust, observation.time_s, memory.first_ne, memory.standing), settings
@@ -188,7 +188,7 @@ def _remembered(
     if settings.leave_behind:
         roles = leave_behind(roles, trust=trust, dt=dt)
     if settings.hand_over:
-        roles = hand_over(roles, trust=trust, heard=heard, offset_ne=settings.offset_ne)
+        roles = hand_over(roles, trust=trust, heard=heard, offset_ne=settings.offset_ne, places=settings.leaders, dt=dt)
     return Memory(now, memory.first_ne, memory.standing + (trust - 0.5) * dt, roles)
 
 

@@ -138,7 +138,8 @@ def weigh(
     graph: who hears whom; without it (before the mission) robots are watched and not yet judged.
     """
     commanded = np.concatenate([evidence.commanded_ne[1:], commanded_ne[None]])
-    expected = follow(watch.response, evidence.expected, commanded, dt=watch.dt)
+    returns = told & (evidence.silent_s > PLACE_MEMORY_S)
+    expected = _begun_anew(follow(watch.response, evidence.expected, commanded, dt=watch.dt), velocity_ne, returns)
     smooth = _share(SMOOTHING_S, watch.dt)
 
     off = velocity_ne - expected.velocity_ne
@@ -151,7 +152,7 @@ def weigh(
     # one wild velocity must not carry the prediction off; and who is silent flies on as healthy robots would
     flown = _update(expected.velocity_ne, velocity_ne - (off - believable), told)
     predicted = evidence.predicted_ne + watch.dt * flown
-    predicted = _update(predicted, position_ne, told & (evidence.silent_s > PLACE_MEMORY_S))
+    predicted = _update(predicted, position_ne, returns)
     strayed = _update(evidence.strayed_ne, capped(position_ne - predicted, WILDEST), told)
     predicted = _update(predicted, predicted + _share(PLACE_MEMORY_S, watch.dt) * strayed, told)
     inconsistency = evidence.inconsistency_ne + smooth * (strayed - evidence.inconsistency_ne)
@@ -192,9 +193,9 @@ def _judge(evidence: Evidence, watch: Watch, velocity_ne: Array, told: Flags, gr
 def shared(raw_ne: Array, told: Flags) -> Array:
     """What nearly all residuals (N, 2) have in common, (2,): the doing of the air, or of the model, and nobody's fault.
 
-    Axis by axis, with a third of the robots left aside at either end, it is the residual closest to zero, and nothing
-    where those between differ in sign: so no third of the swarm can put its fault upon the others. Of fewer than three
-    robots nothing can be said.
+    Axis by axis, with the outermost left aside, (n − 1) // 3 at either end, it is the residual closest to zero, and
+    nothing where those between differ in sign: so no third of the swarm can put its fault upon the others. Of fewer
+    than three robots nothing can be said.
     """
     count = int(np.count_nonzero(told))
     if count < ENOUGH_TO_SHARE:
@@ -257,6 +258,14 @@ INNOCENT = math.sqrt(4.0 * math.log(RATIO) / (1.0 - RATIO**-2))
 def trust_of(log_odds: Array) -> Array:
     """Trust (N,) in [0, 1] from log odds of being faulty: the probability of being healthy."""
     return np.asarray(1.0 / (1.0 + np.exp(log_odds)))
+
+
+def _begun_anew(expected: Motion, velocity_ne: Array, returns: Flags) -> Motion:
+    """Of robots that come back after a long silence nobody knows which commands reached them."""
+    if not returns.any():
+        return expected
+    known = returns[:, None]
+    return Motion(np.where(known, velocity_ne, expected.velocity_ne), np.where(known, 0.0, expected.acceleration_ne))
 
 
 def _update(before: Array, after: Array, told: Flags) -> Array:

@@ -140,16 +140,3 @@ def normalised(graph: Graph, quality: Array) -> Array:
         total = np.where(lost, 1.0, total)
     weights: Array = quality / total[graph.receiver]
     return weights
-
-
-def nearest(position_ne: Array) -> Array:
-    """Distance (N,) m from each robot (N, 2) m to the closest other; infinite for a robot alone or of unknown place."""
-    if len(position_ne) < 2:
-        return np.full(len(position_ne), np.inf)
-    from scipy.spatial import cKDTree
-
-    known = np.isfinite(position_ne).all(axis=1)
-    distance = np.full(len(position_ne), np.inf)
-    if np.count_nonzero(known) > 1:
-        distance[known] = cKDTree(position_ne[known]).query(position_ne[known], k=2)[0][:, 1]
-    return distance

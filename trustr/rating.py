@@ -20,9 +20,9 @@ GIVEN_REPAIRED = np.array([0.02, 0.09, 0.24, 0.32, 0.33])
 and 3.83; being normal distributions of SD 1.2 rounded to the scale, they give its U (A = 0.89) too."""
 MOST_AT_ONCE = 1.5
 """What one rating may say at most: a single 5 for a faulty robot would be e^3.5 to 1, and people slip."""
-CAP = 3.0
-"""What all ratings together may say: a robot whose own evidence is as good as it gets (−4) cannot be talked below trust
-0.5, nor one whose evidence is as bad as it gets (+6) be talked back."""
+CAP = 2.9
+"""What all ratings together may say: a robot whose own evidence is as good as it gets (−4), or of which nothing is
+known yet (−2.94), cannot be talked below trust 0.5, nor one whose evidence is as bad as it gets (+6) be talked back."""
 _EVIDENCE = np.clip(np.log(GIVEN_FAULTY / GIVEN_REPAIRED), -MOST_AT_ONCE, MOST_AT_ONCE)
 
 

@@ -151,6 +151,8 @@ def ticks(path: Path) -> Iterator[RecordedTick]:
                 received, sent, said = [], [], []
 
 
+FRESH_S = 0.3
+"""Older telemetry says nothing of this tick."""
 SteeredTick = tuple[int, Table, Table, Table]
 """(tick, set-points sent, velocities, positions), (N, 2) each: m/s and m, NaN where there is none."""
 
@@ -171,10 +173,11 @@ def _steered(path: Path) -> Iterator[SteeredTick]:
                 fleet = orjson.loads(message.data)
             elif channel.topic == "/tick" and setpoint is not None:
                 sent, commanded = _table(setpoint["sent"]), np.array(setpoint["commanded"])
+                fresh = np.array(fleet["age_s"], dtype=np.float64) <= FRESH_S
                 yield (
                     setpoint["tick"],
                     np.where(commanded[:, None], sent, np.nan),
-                    _table(fleet["velocity_m_s"]),
+                    np.where(fresh[:, None], _table(fleet["velocity_m_s"]), np.nan),
                     _table(fleet["position_m"]),
                 )
                 setpoint = None
