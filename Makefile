@@ -20,7 +20,7 @@ setup: $(VENV)/.ready
 
 fly: setup
 	$(BIN)/gcs run emergency --controller average --out $(RUNS)/average
-	$(BIN)/gcs run emergency --controller trust-r --out $(RUNS)/trust-r
+	$(BIN)/gcs run emergency --controller trust-r --trust auto --out $(RUNS)/trust-r
 	$(BIN)/gcs compare $(RUNS)/average $(RUNS)/trust-r --out $(RUNS)/comparison.png
 
 test: setup
