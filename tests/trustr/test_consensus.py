@@ -326,4 +326,4 @@ def test_a_swarm_that_all_distrust_goes_on_as_it_is():
 
 
 def test_the_names_of_rules_are_those_that_a_scenario_may_give():
-    assert tuple(RULES) == NAMES
+    assert tuple(RULES) == tuple(NAMES)

@@ -15,7 +15,7 @@ from trustr.consensus import RULES
 from trustr.controller import Memory, Observation
 from trustr.controller import decide as remember_and_decide
 from trustr.leader import VirtualLeader
-from trustr.roles import Roles
+from trustr.roles import GONE_S, Roles
 from trustr.separation import separation
 
 PROFILES = ("paper", "recommended")
@@ -252,10 +252,9 @@ def test_confidence_in_the_first_velocity_fades_from_tick_to_tick():
 # --- parts that trust gives and takes
 
 
-def remembering(chosen, *, left=(), leaders=None):
-    """A memory in which these robots were left behind, and these lead."""
-    six = np.arange(6)
-    roles = replace(Roles.of(6, chosen.leaders if leaders is None else np.array(leaders)), left=np.isin(six, left))
+def remembering(chosen, *, left=(), for_s=0.0):
+    """A memory in which these robots were left behind so long ago."""
+    roles = replace(Roles.of(6, chosen.leaders), left_s=np.where(np.isin(np.arange(6), left), for_s, nan))
     return Memory(0.0, np.zeros((6, 2)), np.zeros(6), roles)
 
 
@@ -272,12 +271,13 @@ def test_between_others_and_a_robot_left_behind_the_weight_is_exactly_zero(rule,
 
 
 @profiles
-def test_the_others_still_keep_apart_from_a_robot_left_behind(profile):
+@pytest.mark.parametrize(("for_s", "keeps"), [(0.0, 1), (GONE_S - 0.1, 1), (GONE_S, 0), (60.0, 0)])
+def test_the_others_keep_apart_from_a_robot_left_behind_until_it_is_out_of_their_plane(profile, for_s, keeps):
     chosen = replace(SETTINGS[profile], c1=0.0, c2=0.0, formation_gain=0.0)
     seen = in_formation(chosen)
     seen.position_ne[4] = seen.position_ne[5] + [-1.0, 0.0]
-    command = decide(seen, REST, chosen, remembering(chosen, left=[4])).velocity_ne
-    assert command[5, 0] == pytest.approx(chosen.separation_gain * (chosen.separation_radius - 1.0))
+    command = decide(seen, REST, chosen, remembering(chosen, left=[4], for_s=for_s)).velocity_ne
+    assert command[5, 0] == pytest.approx(keeps * chosen.separation_gain * (chosen.separation_radius - 1.0))
 
 
 def test_a_robot_left_behind_is_left_after_fifty_ticks_without_hope():
@@ -302,6 +302,16 @@ def test_who_takes_a_leaders_role_is_steered_in_its_stead(profile):
     assert decision.roles.leaders.tolist() == [1, 2]
     assert decision.velocity_ne[[1, 2], 0] == pytest.approx(chosen.c1)
     assert not decision.velocity_ne[[0, 3, 4, 5]].any()
+
+
+@profiles
+def test_a_tick_at_which_a_leader_is_not_heard_changes_no_role(profile):
+    chosen, memory = replace(SETTINGS[profile], hand_over=True), None
+    seen = in_formation(chosen)
+    for tick in range(30):
+        heard = np.arange(6) != (0 if tick % 10 else -1)
+        memory, decision = remember_and_decide(memory, replace(seen, heard=heard, time_s=tick * 0.1), REST, chosen)
+        assert decision.roles.leaders.tolist() == [0, 2]
 
 
 @profiles

@@ -1,7 +1,7 @@
 """Who hears whom (N_i), how well (eq. 13), with what weight (eq. 17)."""
 
 import itertools
-from math import exp, inf, nan
+from math import exp, nan
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from trustr.network import DENSE_BELOW, communication_quality, nearest, neighbours, normalised
+from trustr.network import DENSE_BELOW, communication_quality, neighbours, normalised
 
 RANGE, BEST, DECAY, ETA, THRESHOLD = 28.0, 6.0, 2.0, 0.05, 0.5
 
@@ -241,15 +241,3 @@ def test_trust_counts_against_other_trust_only(swarm, share):
     position, heard, trust = swarm
     whole = weight_matrix(position, heard, trust, weights="literal")
     assert weight_matrix(position, heard, share * trust, weights="literal") == pytest.approx(whole, abs=1e-9)
-
-
-# --- the nearest
-
-
-@given(st.integers(1, 8).flatmap(lambda n: arrays(float, (n, 2), elements=st.floats(-30, 30) | st.just(nan))))
-def test_the_nearest_is_the_closest_other_of_known_place(position):
-    known = np.isfinite(position).all(1)
-    for robot, distance in enumerate(nearest(position)):
-        others = position[known & (np.arange(len(position)) != robot)]
-        apart = np.hypot(*(others - position[robot]).T)
-        assert distance == pytest.approx(apart.min() if known[robot] and len(others) else inf, abs=1e-9)
