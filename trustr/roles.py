@@ -104,7 +104,7 @@ def closed_up(offset_ne: Array, files: tuple[Indices, ...], left: Flags) -> Arra
     flown and judged by the same point. Who is left behind keeps its place; nobody goes there.
     """
     places = offset_ne.copy()
-    if left.any():
+    if left.any() and not left.all():
         for file in files:
             remain = file[~left[file]]
             places[remain] = offset_ne[file[: len(remain)]]
