@@ -5,11 +5,13 @@ A rule from outside is tried once on the ground, and what it returns is checked 
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import sys
 import traceback
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +41,21 @@ def rehearse(settings: Settings) -> None:
     graph = neighbours(settings.offset_ne, np.ones(count, bool), range_m=settings.range_m)
     velocity = 1.0 + 0.01 * np.arange(2.0 * count).reshape(count, 2)
     settings.rule(Heard(graph, velocity, np.ones(count), 0.0, velocity, np.zeros(count)), settings)
+
+
+@cache
+def source_digest(name: str) -> str:
+    """Of the files that hold a rule from outside, as this process first found them: imported once, they are what flies.
+
+    Raises RuleError.
+    """
+    function = _imported(name)
+    modules = {name.partition(":")[0], getattr(function, "__module__", None)}
+    files = {getattr(sys.modules.get(module or ""), "__file__", None) for module in modules}
+    hashed = hashlib.sha256()
+    for file in sorted(file for file in files if file is not None):
+        hashed.update(Path(file).read_bytes())
+    return hashed.hexdigest()[:20]
 
 
 def _imported(name: str) -> Callable[..., Any]:

@@ -43,11 +43,11 @@ def conduct(tasks: list[Task], workers: Callable[[], Workers], *, folder: Path, 
     Raises UnusableJournal, WorkersLost, and KeyboardInterrupt; whenever it ends, the finished runs are kept.
     """
     began = time.perf_counter()
-    with Journal(folder, code=code_digest()) as journal:
+    with Journal(folder) as journal:
         wanted = {task.key: task for task in tasks}
         missing = [task for key, task in wanted.items() if key not in journal.runs]
         kept, crashed, count = len(wanted) - len(missing), dict[str, RunResult](), 0
-        strangers = len(journal.from_other_code & wanted.keys())
+        strangers = sum(key in wanted and run.code != code_digest() for key, run in journal.runs.items())
         if strangers:
             words = f"{strangers} runs were flown by other sources than these, under the same version; they count"
             _say(console, f"{journal.path}: {words} all the same. Remove the file to fly them again.")

@@ -20,13 +20,10 @@ class UnusableJournal(RecordingError):
 class Journal:
     """Reads what earlier calls left, then appends; one process at a time."""
 
-    def __init__(self, folder: Path, *, code: str) -> None:
+    def __init__(self, folder: Path) -> None:
         self.path = folder / JOURNAL
-        self._code = code
         self.runs: dict[str, RunResult] = {}
         """By key."""
-        self.from_other_code: set[str] = set()
-        """Keys of those that were flown by other sources under the same version."""
 
     def __enter__(self) -> Journal:
         try:
@@ -55,7 +52,7 @@ class Journal:
         if run.crashed:
             return
         try:
-            self._stream.write(run.line(self._code))
+            self._stream.write(run.line())
         except OSError as error:
             raise UnusableJournal(f"{self.path}: cannot be written: {error.strerror or error}") from None
         self.runs[run.key] = run
@@ -68,11 +65,9 @@ class Journal:
             os.ftruncate(self._stream.fileno(), whole)
         for number, line in enumerate(content[:whole].splitlines(), start=1):
             try:
-                run, code = RunResult.of_line(line)
+                run = RunResult.of_line(line)
             except (ValueError, TypeError, KeyError, AttributeError):
                 raise UnusableJournal(
                     f"{self.path}, line {number}: is no run of this version: {line[:60].decode(errors='replace')!r}"
                 ) from None
             self.runs[run.key] = run
-            if code != self._code:
-                self.from_other_code.add(run.key)

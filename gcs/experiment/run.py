@@ -7,17 +7,21 @@ import math
 import time
 import traceback
 from dataclasses import asdict, dataclass, replace
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
 import orjson
 
+from gcs.control import settings
 from gcs.events import Rating
+from gcs.rules import RuleError, source_digest
 from gcs.scoring import Score
 from gcs.summary import trust_of
 from gcs.trial import Trial, attempt
 from scenarios import Scenario, ScenarioError, healthy_robots
 from scenarios.experiment import Experiment
+from scenarios.models import RULES
 from trustr.raters import MODELS
 
 
@@ -64,42 +68,53 @@ class RunResult:
     """The problem is an error of the program's, not of the flight's: nothing is known about such a run."""
     wall_s: float
     cpu_s: float
+    code: str
+    """Digest of the sources that flew it."""
 
     def named_as(self, task: Task) -> RunResult:
         """The same outcome in another place of the experiment."""
         return replace(self, suite=task.suite, condition=task.condition, arm=task.arm)
 
-    def line(self, code: str) -> bytes:
-        """One line of JSON. code: digest of the sources that flew it."""
-        return orjson.dumps(asdict(self) | {"code": code}, option=orjson.OPT_NON_STR_KEYS | orjson.OPT_APPEND_NEWLINE)
+    def line(self) -> bytes:
+        """One line of JSON."""
+        return orjson.dumps(asdict(self), option=orjson.OPT_NON_STR_KEYS | orjson.OPT_APPEND_NEWLINE)
 
     @staticmethod
-    def of_line(line: bytes) -> tuple[RunResult, str]:
-        """And the digest. Raises ValueError, TypeError or KeyError."""
+    def of_line(line: bytes) -> RunResult:
+        """Raises ValueError, TypeError or KeyError."""
         said = orjson.loads(line)
-        code = said.pop("code")
         detected = {int(vehicle): seconds for vehicle, seconds in said.pop("detected").items()}
-        return RunResult(detected=detected, **said), code
+        return RunResult(detected=detected, **said)
 
 
 def tasks(experiment: Experiment, *, seeds: int) -> list[Task]:
     """Every run, seed by seed: an experiment that is broken off has flown all arms about equally often.
 
-    Raises ScenarioError.
+    Every rule is tried on the ground. Raises ScenarioError and RuleError.
     """
     for arm in experiment.arm:
         if arm.ratings is not None and arm.ratings not in MODELS:
             raise ScenarioError(f"arm {arm.name}: ratings = {arm.ratings!r}: allowed are {', '.join(MODELS)}")
-    places = []
+    places, tried = [], set[str]()
     for condition in experiment.conditions:
         for arm in experiment.arms_of(condition):
             scenario = condition.build(arm)
-            places.append((condition, arm, scenario, orjson.dumps(scenario.model_dump(mode="json"))))
+            if scenario.control.rule not in tried:
+                settings(scenario)
+                tried.add(scenario.control.rule)
+            places.append((condition, arm, scenario, _said(scenario)))
     return [
-        Task(_key(said, arm.ratings, seed), condition.suite, condition.name, arm.name, seed, scenario, arm.ratings)
+        Task(_key(*said, arm.ratings, seed), condition.suite, condition.name, arm.name, seed, scenario, arm.ratings)
         for seed in range(1, seeds + 1)
         for condition, arm, scenario, said in places
     ]
+
+
+def _said(scenario: Scenario) -> tuple[str | bytes, ...]:
+    """What of a scenario decides a flight; a rule that does not ship by its source too, for nobody counts versions."""
+    said = orjson.dumps(scenario.model_dump(mode="json"))
+    rule = scenario.control.rule
+    return (said,) if rule in RULES else (source_digest(rule), said)
 
 
 def _key(*decisive: object) -> str:
@@ -111,6 +126,7 @@ def fly_run(task: Task) -> RunResult:
     began_wall, began_cpu = time.perf_counter(), time.thread_time()
     crashed = False
     try:
+        _check_rule(task)
         trial = attempt(task.scenario, seed=task.seed, ratings=spoken(task))
     except Exception as error:
         if isinstance(error.__cause__, KeyboardInterrupt):  # inside JSBSim, Ctrl-C comes out as a SystemError
@@ -137,7 +153,15 @@ def fly_run(task: Task) -> RunResult:
         crashed=crashed,
         wall_s=round(time.perf_counter() - began_wall, 4),
         cpu_s=round(time.thread_time() - began_cpu, 4),
+        code=code_digest(),
     )
+
+
+def _check_rule(task: Task) -> None:
+    """A worker that has lived for long may hold a rule as it was before. Raises RuleError."""
+    rule = task.scenario.control.rule
+    if rule not in RULES and _key(*_said(task.scenario), task.ratings, task.seed) != task.key:
+        raise RuleError(f"control.rule = {rule!r}: this worker holds another version of it; start it anew")
 
 
 def spoken(task: Task) -> tuple[Rating, ...] | None:
@@ -153,12 +177,15 @@ def _finite(score: Score | None) -> float | None:
     return None if score is None or math.isinf(score.min_separation_m) else score.min_separation_m
 
 
-def code_digest() -> str:
-    """Of the sources that fly: two digests under one version are two programs."""
-    root = Path(__file__).parents[2]
-    hashed = hashlib.sha256()
+@cache
+def code_digest(root: Path = Path(__file__).parents[2]) -> str:
+    """Of the sources and aircraft that fly in this process, and of what they calculate with.
+
+    Two digests under one version are two programs.
+    """
+    hashed = hashlib.sha256(repr([version(package) for package in ("jsbsim", "numpy")]).encode())
     for room in ("aircraft", "fdm", "gcs", "scenarios", "trustr", "wire"):
-        for path in sorted((root / room).glob("*.py")):
-            if path.name != "cli.py":
-                hashed.update(path.name.encode() + path.read_bytes())
+        for path in sorted((root / room).rglob("*")):
+            if path.suffix in (".py", ".xml") and path.name != "cli.py":
+                hashed.update(str(path.relative_to(root)).encode() + path.read_bytes())
     return hashed.hexdigest()[:12]

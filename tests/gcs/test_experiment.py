@@ -3,6 +3,7 @@
 import csv
 import fcntl
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -15,6 +16,7 @@ from importlib.metadata import PackageNotFoundError, version
 from io import StringIO
 from itertools import pairwise
 from math import isnan
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import orjson
@@ -189,7 +191,7 @@ def test_a_run_is_what_the_flight_scores(flown):
     _, folder, *_ = flown
     task = tasks(parse_experiment(SHORT, source="x"), seeds=1)[1]
     expected = attempt(task.scenario, seed=1).score
-    kept = next(r for r, _ in map(RunResult.of_line, lines(folder)) if r.key == task.key)
+    kept = next(run for run in map(RunResult.of_line, lines(folder)) if run.key == task.key)
     assert (kept.heading_error_deg, kept.distance_to_target_m) == (
         expected.heading_error_deg,
         expected.distance_to_target_m,
@@ -266,6 +268,98 @@ def test_flights_that_are_the_same_under_two_names_are_flown_once(gcs, flown, tm
         assert said["timing"]["flown"] == 0
         free, again = ([c | {"suite": ""} for c in said["suites"] if c["suite"] == s] for s in ("fault-free", "again"))
         assert free == again
+
+
+OWN_RULE = """
+from trustr.consensus import average
+
+def mine(heard, settings):
+    return average(heard, settings)
+"""
+
+
+def test_a_rule_of_ones_own_is_flown_again_when_its_source_has_changed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "own.toml"
+    fault_free = SHORT.replace('[[suite]]\nname = "base"\nseverities = [0.4]\n', "")
+    path.write_text(fault_free.replace('controller = "average"', 'controller = "own_rule:mine"'), encoding="utf-8")
+    words = (path, "--seeds", 1, "--jobs", 1, "--out", "out", "--json")
+    (tmp_path / "own_rule.py").write_text(OWN_RULE, encoding="utf-8")
+    first = command(*words)
+    assert first.returncode == 0, first.stderr
+    assert [orjson.loads(done.stdout)["timing"]["flown"] for done in (first, command(*words))] == [2, 0]
+    (tmp_path / "own_rule.py").write_text(OWN_RULE + "# better\n", encoding="utf-8")
+    assert orjson.loads(command(*words).stdout)["timing"]["flown"] == 1
+
+
+def own(rule):
+    """Tasks of one arm with this rule."""
+    return tasks(parse_experiment(SHORT.replace('"average"\n\n', f'"{rule}"\n\n'), source="x"), seeds=1)
+
+
+def test_a_worker_that_holds_an_older_version_of_a_rule_says_so_and_its_run_is_no_result(tmp_path, monkeypatch):
+    (tmp_path / "aged_rule.py").write_text(OWN_RULE, encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    task = own("aged_rule:mine")[0]
+    found = fly_run(replace(task, key="of another version"))
+    assert found.crashed
+    assert "this worker holds another version of it" in found.problem
+
+
+@pytest.mark.parametrize(
+    ("rule", "said"),
+    [
+        ("no_such_module:mine", "there is no module no_such_module"),
+        ("broken_rule:mine", "it raised ZeroDivisionError"),
+        ("broken_rule:other", "has no function other"),
+    ],
+)
+def test_a_rule_that_cannot_be_flown_is_told_before_anything_flies(rule, said, gcs, short, tmp_path, monkeypatch):
+    (tmp_path / "broken_rule.py").write_text("def mine(heard, settings):\n    return 1 / 0\n", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    short.write_text(SHORT.replace('controller = "average"', f'controller = "{rule}"'), encoding="utf-8")
+    code, out, err = gcs(short, "--jobs", 1, "--out", tmp_path / "out")
+    assert (code, out) == (2, "")
+    assert one_sentence(err)
+    assert f"control.rule = {rule!r}: " in err
+    assert said in err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "file",
+    ["gcs/flight.py", "gcs/experiment/run.py", "gcs/recording/writer.py", "aircraft/quad/quad.xml",
+     "aircraft/quad/Systems/rotors.xml"],
+)  # fmt: skip
+def test_the_digest_is_of_all_sources_and_of_the_aircraft(file, tmp_path):
+    root = Path(run.__file__).parents[2]
+    for room in ("aircraft", "fdm", "gcs", "scenarios", "trustr", "wire"):
+        shutil.copytree(root / room, tmp_path / "a" / room, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(tmp_path / "a", tmp_path / "b")
+    assert run.code_digest(tmp_path / "a") == run.code_digest(tmp_path / "b")
+    run.code_digest.cache_clear()
+    with (tmp_path / "b" / file).open("a", encoding="utf-8") as stream:
+        stream.write("\n")
+    assert run.code_digest(tmp_path / "a") != run.code_digest(tmp_path / "b")
+
+
+def test_the_digest_is_of_what_calculates_too(monkeypatch):
+    of = run.code_digest.__wrapped__
+    here = of()
+    monkeypatch.setattr(run, "version", lambda package: "0.0" if package == "jsbsim" else version(package))
+    assert of() != here
+
+
+def test_a_run_names_the_sources_of_the_process_that_flew_it(monkeypatch):
+    monkeypatch.setattr(run, "code_digest", lambda: "of the worker")
+    (task, *_) = tasks(parse_experiment(SHORT, source="x"), seeds=1)
+    assert orjson.loads(fly_run(task).line())["code"] == "of the worker"
+
+
+def test_the_keys_of_rules_that_ship_stay_what_they_were(monkeypatch):
+    """As in journals of version 0.1.0; a change of the scenario's keys or defaults changes them, and must be meant."""
+    monkeypatch.setattr(run, "version", lambda _: "0.1.0")
+    assert tasks(load_experiment("base"), seeds=1)[0].key == "948ee6a18696040c310a"
 
 
 def test_runs_of_other_sources_under_the_same_version_count_but_are_told(gcs, flown, tmp_path):
@@ -513,7 +607,7 @@ def made(arm, passes, *, suite="s", condition="c", **changes):
     one = RunResult(
         key="", suite=suite, condition=condition, arm=arm, seed=0, passed=False, heading_error_deg=1.0,
         distance_to_target_m=2.0, min_separation_m=1.5, faulty=0, detected={}, false_alarms=0, problem=None,
-        crashed=False, wall_s=1.0, cpu_s=1.0,
+        crashed=False, wall_s=1.0, cpu_s=1.0, code="c0de",
     )  # fmt: skip
     return [replace(one, seed=seed, passed=bool(passed), **changes) for seed, passed in enumerate(passes, start=1)]
 
@@ -589,8 +683,8 @@ def test_rules_that_use_no_trust_find_nobody_and_alarm_nobody():
 
 def test_a_line_of_the_journal_reads_back_as_the_run_it_was():
     (one,) = made("a", [1], detected={5: 0.1 + 0.2, 12: 3.0}, problem="a\nb")
-    assert RunResult.of_line(one.line("abc")) == (one, "abc")
-    assert one.line("abc").count(b"\n") == 1
+    assert RunResult.of_line(one.line()) == one
+    assert one.line().count(b"\n") == 1
 
 
 # Pictures and progress
