@@ -133,8 +133,9 @@ def test_a_last_line_may_lack_its_end_but_not_a_part_of_itself(talk):
     assert cut.over
 
 
-def test_a_web_page_that_posts_a_rating_is_not_heard(talk):
-    talk.receive(b"POST / HTTP/1.1\r\nHost: localhost\r\n\r\n" + line(BAD))
+@pytest.mark.parametrize("length", [0, 1100, 3900])
+def test_a_web_page_that_posts_a_rating_is_not_heard_however_long_the_path(talk, length):
+    talk.receive(b"POST /" + b"a" * length + b" HTTP/1.1\r\nHost: localhost\r\n\r\n" + line(BAD))
     assert talk.step(0) == []
     assert "no web server" in answers(talk)[0]["error"]
     assert talk.over

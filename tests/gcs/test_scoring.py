@@ -129,9 +129,17 @@ def test_a_fault_is_detected_at_the_first_tick_of_distrust_after_its_onset(delay
     assert result.false_alarms == 0
 
 
-def test_trust_that_came_back_before_the_onset_detected_nothing():
+def test_distrust_before_the_onset_is_a_false_alarm_and_where_it_passed_detected_nothing():
     scenario = load("transit", overrides=["fault.0.onset_s=6"])
-    assert score(distrusted(ideal(scenario), 5, 2.0, 4.0), scenario).detected == {}
+    result = score(distrusted(ideal(scenario), 5, 2.0, 4.0), scenario)
+    assert (result.detected, result.false_alarms) == ({}, 1)
+
+
+def test_a_robot_is_sound_until_the_first_of_its_faults_and_never_again():
+    twice = 'fault=[{vehicle=5, kind="frozen_telemetry", onset_s=9}, {vehicle=5, kind="frozen_telemetry", onset_s=3, end_s=4}]'
+    scenario = load("transit", overrides=[twice])
+    assert score(distrusted(ideal(scenario), 5, 3.0, 8.0), scenario).false_alarms == 0
+    assert score(distrusted(ideal(scenario), 5, 2.9, 8.0), scenario).false_alarms == 1
 
 
 def test_trust_of_exactly_one_half_is_trust():

@@ -388,6 +388,16 @@ def test_who_falls_silent_and_comes_back_is_not_accused(ticks):
     assert (odds[~told[:, 2], 2] == odds[FROM - 1, 2]).all()
 
 
+@pytest.mark.parametrize("straight", [True, False])
+def test_who_stood_still_through_a_long_silence_is_not_accused_for_it(straight):
+    """No command reached it."""
+    commanded = commands(seconds=22, straight=straight)
+    obeyed = commanded.copy()
+    obeyed[FROM : FROM + 40, 2] = 0.0
+    sample, told = silent(flight(commanded, obeyed=obeyed, noise=0.05), 2, ticks=40)
+    assert nobody_is_accused(judged(sample, told=told))
+
+
 def test_who_comes_back_with_a_fault_is_found():
     told = commands(seconds=22, straight=True)
     sample, heard = silent(flight(told, obeyed=degraded(told, 2, onset_s=ONSET_S + 1), noise=0.05), 2, ticks=20)

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from trustr.evidence import HIGHEST, LOWEST, PRIOR
 from trustr.rating import CAP, GIVEN_FAULTY, GIVEN_REPAIRED, aged, evidence, study_trust, told, trust_from_rating
 
 SCALE = np.arange(1, 6)
@@ -84,11 +85,11 @@ def test_blame_of_a_swarm_without_a_suspect_is_shared_out_evenly():
     assert told(np.zeros(4), np.zeros(4), 1, None) == pytest.approx([0.375] * 4)
 
 
-def test_no_crowd_talks_a_perfect_robot_down_or_a_hopeless_one_up():
+def test_no_crowd_talks_a_perfect_robot_down_or_an_unknown_one_or_a_hopeless_one_up():
     down = up = np.zeros(1)
     for _ in range(100):
         down, up = told(down, np.ones(1), 1, 0), told(up, np.ones(1), 5, 0)
-    assert -4.0 + down < 0.0 < 6.0 + up
+    assert LOWEST + down < PRIOR + down < 0.0 < HIGHEST + up
 
 
 @given(swarms(), st.lists(RATINGS, min_size=1, max_size=20))
