@@ -17,7 +17,7 @@ from gcs.events import Rating
 from gcs.telemetry import NEVER
 from scenarios import Scenario, healthy_robots
 from trustr.controller import Settings
-from trustr.evidence import INNOCENT, PRIOR, Evidence, Watch, trust_of, weigh
+from trustr.evidence import INNOCENT, PRIOR, Evidence, Watch, forgiven, trust_of, weigh
 from trustr.network import neighbours
 from trustr.rating import CAP, aged, study_trust, told
 from trustr.response import Response
@@ -111,8 +111,7 @@ class Beliefs:
         belief = replace(belief, spoken=np.where(robots, 0.0, belief.spoken))
         if belief.evidence is None:
             return belief
-        odds = np.where(robots, PRIOR, belief.evidence.log_odds)
-        return replace(belief, evidence=replace(belief.evidence, log_odds=odds))
+        return replace(belief, evidence=forgiven(belief.evidence, robots))
 
     def _odds(self, belief: Belief) -> Array:
         """(N,) log odds of being faulty, all told."""

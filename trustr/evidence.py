@@ -255,6 +255,18 @@ INNOCENT = math.sqrt(4.0 * math.log(RATIO) / (1.0 - RATIO**-2))
 """A residual of so many σ_h speaks neither for nor against a robot: 2.39."""
 
 
+def forgiven(evidence: Evidence, robots: Flags) -> Evidence:
+    """The same, and of these robots (N,) nothing is known: no odds, and no residuals to bring them back."""
+    some = robots[:, None]
+    return replace(
+        evidence,
+        residual_ne=np.where(some, 0.0, evidence.residual_ne),
+        inconsistency_ne=np.where(some, 0.0, evidence.inconsistency_ne),
+        disagreement_ne=np.where(some, 0.0, evidence.disagreement_ne),
+        log_odds=np.where(robots, PRIOR, evidence.log_odds),
+    )
+
+
 def trust_of(log_odds: Array) -> Array:
     """Trust (N,) in [0, 1] from log odds of being faulty: the probability of being healthy."""
     return np.asarray(1.0 / (1.0 + np.exp(log_odds)))

@@ -25,6 +25,7 @@ from trustr.evidence import (
     TICK_S,
     WILDEST,
     Evidence,
+    forgiven,
     neighbourhood,
     shared,
     spreads,
@@ -396,6 +397,16 @@ def test_who_stood_still_through_a_long_silence_is_not_accused_for_it(straight):
     obeyed[FROM : FROM + 40, 2] = 0.0
     sample, told = silent(flight(commanded, obeyed=obeyed, noise=0.05), 2, ticks=40)
     assert nobody_is_accused(judged(sample, told=told))
+
+
+def test_who_is_forgiven_is_as_one_of_whom_nothing_is_known_and_nobody_else_is():
+    evidence = gathered(flight(degraded(commands(seconds=17), 2, 3)))[-1]
+    one = forgiven(evidence, np.arange(6) == 2)
+    assert evidence.log_odds[2] > PRIOR == one.log_odds[2]
+    for field in ("residual_ne", "inconsistency_ne", "disagreement_ne"):
+        assert not getattr(one, field)[2].any()
+        others = np.arange(6) != 2
+        assert (getattr(one, field)[others] == getattr(evidence, field)[others]).all()
 
 
 def test_who_comes_back_with_a_fault_is_found():
