@@ -136,8 +136,8 @@ def test_distrust_before_the_onset_is_a_false_alarm_and_where_it_passed_detected
 
 
 def test_a_robot_is_sound_until_the_first_of_its_faults_and_never_again():
-    twice = 'fault=[{vehicle=5, kind="frozen_telemetry", onset_s=9}, {vehicle=5, kind="frozen_telemetry", onset_s=3, end_s=4}]'
-    scenario = load("transit", overrides=[twice])
+    late, early = (f'{{vehicle=5, kind="frozen_telemetry", onset_s={onset_s}}}' for onset_s in (9, 3))
+    scenario = load("transit", overrides=[f"fault=[{late}, {early}]"])
     assert score(distrusted(ideal(scenario), 5, 3.0, 8.0), scenario).false_alarms == 0
     assert score(distrusted(ideal(scenario), 5, 2.9, 8.0), scenario).false_alarms == 1
 
