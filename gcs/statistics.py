@@ -80,9 +80,9 @@ class PairedDifference:
     def of(passes: Sequence[tuple[bool, bool]]) -> PairedDifference:
         """Of (this one passed, the other passed), one a seed.
 
-        The adjusted Wald interval: half a pair is added to each of the four outcomes, so it keeps a width where the
-        two never disagree. Pooled over conditions whose rates differ it is on the safe side: a binomial variance is
-        at least the sum of its strata's.
+        The adjusted Wald interval: one pair is added to each of the two outcomes in which they disagree, and so two to
+        the number of pairs; it keeps a width where they never disagree. Pooled over conditions whose rates differ it is
+        on the safe side: a binomial variance is at least the sum of its strata's.
         Source: D. G. Bonett, R. M. Price (2012), Journal of Educational and Behavioral Statistics 37, 479–488; as
         recommended by M. W. Fagerland, S. Lydersen, P. Laake (2014), Statistics in Medicine 33, 2850–2875.
         """

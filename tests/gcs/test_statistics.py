@@ -56,6 +56,14 @@ def test_the_paired_interval_is_that_of_a_published_example():
     assert (found.low, found.high) == pytest.approx((-0.508, -0.013), abs=5e-4)
 
 
+def test_the_paired_interval_counts_one_more_pair_in_each_of_the_outcomes_that_disagree():
+    """The same pairs by hand: (1 + 1) and (7 + 1) of 21 + 2."""
+    won, lost = 2 / 23, 8 / 23
+    half = 1.959964 * ((won + lost - (won - lost) ** 2) / 23) ** 0.5
+    found = PairedDifference.of(pairs(1, 1, 7, 12))
+    assert (found.low, found.high) == pytest.approx((won - lost - half, won - lost + half))
+
+
 def test_two_that_never_disagree_in_thirty_pairs_still_have_an_interval():
     found = PairedDifference.of(pairs(30, 0, 0, 0))
     half = 1.959964 * (2 / 32 / 32) ** 0.5
