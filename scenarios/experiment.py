@@ -32,10 +32,12 @@ from pydantic import AfterValidator, Field, ValidationError, ValidationInfo, fie
 
 from scenarios.faults import MotorDegradation
 from scenarios.loading import FOLDER, ScenarioError, explain, load, names
-from scenarios.models import Scenario
+from scenarios.models import RULES, Scenario
 from scenarios.section import Fraction, Section
 
 EXPERIMENTS = FOLDER / "experiments"
+LISTENING = ("ratings", "fused")
+"""Trust sources that take ratings."""
 
 Name = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^|\n]*$")]
 Overrides = tuple[str, ...]
@@ -115,6 +117,8 @@ class Condition:
             scenario = load(self.scenario, overrides=(*self.overrides, *arm.overrides))
         except ScenarioError as error:
             raise ScenarioError(f"{self}, arm {arm.name}: {str(error).removeprefix('--')}") from None
+        if arm.ratings is not None and (deaf := _deaf(scenario)) is not None:
+            raise ScenarioError(f"{self}, arm {arm.name}: ratings = {arm.ratings!r}: {deaf}")
         if self.no_fault:
             return scenario.without_faults()
         if self.severity is None:
@@ -125,6 +129,14 @@ class Condition:
 
     def __str__(self) -> str:
         return f"{self.suite}/{self.name}"
+
+
+def _deaf(scenario: Scenario) -> str | None:
+    """Why ratings would say nothing here."""
+    rule, source = scenario.control.rule, scenario.trust.source
+    if not RULES.get(rule, True):
+        return f"the rule {rule} asks for no trust"
+    return None if source in LISTENING else f"trust from {source} takes none; allowed are {', '.join(LISTENING)}"
 
 
 class Experiment(Section):
@@ -156,6 +168,8 @@ class Experiment(Section):
         if self.reference is not None and self.reference not in arms:
             raise ValueError(f"reference = {self.reference!r}: there is no such arm; allowed are {', '.join(arms)}")
         for place, arm in enumerate(self.arm):
+            if arm.suites == ():
+                raise ValueError(f"arm.{place}.suites = []: {arm.name} would fly nowhere; without the key, everywhere")
             for name in arm.suites or ():
                 if name not in suites:
                     raise ValueError(
@@ -164,6 +178,8 @@ class Experiment(Section):
         for place, suite in enumerate(self.suite):
             if not (self.scenarios if suite.scenarios is None else suite.scenarios):
                 raise ValueError(f"suite.{place} ({suite.name}): no scenarios, neither here nor for all suites")
+            if not any(arm.suites is None or suite.name in arm.suites for arm in self.arm):
+                raise ValueError(f"suite.{place} ({suite.name}): no arm flies there")
             _once((condition.name for condition in self._conditions_of(suite)), f"condition of suite.{place}")
         return self
 

@@ -115,6 +115,19 @@ def test_a_scenarios_path_begins_at_the_experiments_file(tmp_path):
         (HEAD + SUITE + "severities = [0.4, 0.4]\n" + ARM, "'transit 40 %' is there 2 times"),
         ('reference = "auto"\n' + HEAD + SUITE + ARM, "reference = 'auto': there is no such arm; allowed are truth"),
         (HEAD + SUITE + ARM + 'suites = ["x"]\n', "arm.0.suites names 'x': there is no such suite; allowed are base"),
+        (
+            HEAD + SUITE + ARM + "suites = []\n",
+            "arm.0.suites = []: truth would fly nowhere; without the key, everywhere",
+        ),
+        (HEAD + SUITE + SUITE.replace("base", "b") + ARM + 'suites = ["b"]\n', "suite.0 (base): no arm flies there"),
+        (
+            HEAD + SUITE + ARM + 'ratings = "lazy"\n',
+            "base/transit, arm truth: ratings = 'lazy': trust from truth takes none; allowed are ratings, fused",
+        ),
+        (
+            HEAD + SUITE + ARM.replace("trust-r", "median").replace('"truth"\n', '"fused"\n') + 'ratings = "lazy"\n',
+            "ratings = 'lazy': the rule median asks for no trust",
+        ),
         (HEAD + SUITE + 'set = ["noise"]\n' + ARM, "base/transit, arm truth: set noise: must read section.key=value"),
         (HEAD + SUITE + 'set = ["noise.foo=1"]\n' + ARM, "base/transit, arm truth: transit.toml: noise.foo = 1"),
         (
