@@ -24,6 +24,7 @@ class Cell:
     """None: all of the suite's."""
     arm: str
     passed: Share
+    """Of the runs that are results."""
     heading_error_deg: Spread | None
     """Over the runs that came to their read-out; so the distance."""
     distance_to_target_m: Spread | None
@@ -39,6 +40,8 @@ class Cell:
     """Healthy vehicles distrusted, added up over the runs."""
     incomplete: int
     """Runs that could not be completed; they have not passed."""
+    crashed: int
+    """Runs that ended in an error of the program's: no results, and in none of the figures; nor are their pairs."""
     against_reference: PairedDifference | None
     """Of the pass rates, seed by seed; None for the reference itself, and where it was not flown."""
     below_reference: bool
@@ -61,8 +64,8 @@ def _grouped(runs: Sequence[RunResult], reference: str | None, *, pooled: bool) 
     groups: dict[tuple[str, str | None, str], list[RunResult]] = defaultdict(list)
     for run in runs:
         groups[run.suite, None if pooled else run.condition, run.arm].append(run)
-    twins = {(run.suite, run.condition, run.seed): run for run in runs if run.arm == reference}
-    found = [_cell(*place, group, twins) for place, group in groups.items()]
+    twins = {(run.suite, run.condition, run.seed): run for run in runs if run.arm == reference and not run.crashed}
+    found = [_cell(*place, group, twins, itself=place[-1] == reference) for place, group in groups.items()]
     order = {place: number for number, place in enumerate(dict.fromkeys((c.suite, c.condition) for c in found))}
     return sorted(found, key=lambda cell: order[cell.suite, cell.condition])
 
@@ -71,15 +74,18 @@ def _cell(
     suite: str,
     condition: str | None,
     arm: str,
-    runs: list[RunResult],
+    every: list[RunResult],
     twins: dict[tuple[str, str, int], RunResult],
+    *,
+    itself: bool,
 ) -> Cell:
+    """itself: it is the reference."""
+    runs = [run for run in every if not run.crashed]
     pairs = [
         (run.passed, twin.passed)
         for run in runs
         if (twin := twins.get((run.suite, run.condition, run.seed))) is not None
     ]
-    itself = bool(pairs) and next(iter(twins.values())).arm == arm
     against = None if itself or not pairs else PairedDifference.of(pairs)
     faulty = sum(run.faulty for run in runs)
     found = [seconds for run in runs for seconds in run.detected.values()]
@@ -97,6 +103,7 @@ def _cell(
         slowest_s=max(found, default=None),
         false_alarms=sum(run.false_alarms for run in runs),
         incomplete=sum(run.problem is not None for run in runs),
+        crashed=len(every) - len(runs),
         against_reference=against,
         below_reference=against is not None and against.high < -MARGIN,
         passed_where_reference_did=_where([mine for mine, theirs in pairs if theirs]) if pairs else None,

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Sequence
+from contextlib import closing
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
+from gcs.choices import BadUsageError
 from gcs.experiment.conduct import conduct
 from gcs.experiment.journal import JOURNAL
 from gcs.experiment.plot import draw
-from gcs.experiment.results import FILES, Results
+from gcs.experiment.results import FILES, Asked, Results
 from gcs.experiment.run import Task, tasks
+from gcs.experiment.terminal import show
 from gcs.experiment.workers import Cluster, Local, Workers, WorkersLost
 from gcs.recording.writer import RecordingError
 from gcs.session import output_folder
 from scenarios import ScenarioError
 from scenarios.experiment import load_experiment
 
+ALL_CORES = -1
+"""Jobs, unless somebody says otherwise."""
 FLOWN, NOT_COMPLETED, INTERRUPTED = 0, 3, 130
 """Exit codes."""
 MOST_NAMED = 5
@@ -38,28 +44,30 @@ def experiment(
 ) -> int:
     """Exit code. stdout: a console for the table; without one, it gets an object of JSON.
 
-    Raises ScenarioError, RecordingError, NoCluster and UnusableJournal: each one sentence.
+    Raises BadUsageError, ScenarioError, RuleError, RecordingError, NoCluster and UnusableJournal: each one sentence.
     """
+    if dask is not None and jobs != ALL_CORES:
+        raise BadUsageError(f"--jobs {jobs}: with --dask, the cluster's workers fly, as many as it has")
     loaded = load_experiment(name)
     count = loaded.seeds if seeds is None else seeds
     chosen = _chosen(tasks(loaded, seeds=count), only)
-    folder = output_folder(Path("runs") / f"experiment-{Path(name).stem}" if out is None else out, name)
+    asked = Asked(_command_line(name, seeds, only), tuple(only), count, loaded.seeds)
 
     def say(words: str) -> None:
         stderr.print(words, highlight=False, markup=False, soft_wrap=True)
 
-    def workers() -> Workers:
-        return Local(jobs) if dask is None else Cluster(dask)
-
-    try:
-        conducted = conduct(chosen, workers, folder=folder, console=stderr)
-    except KeyboardInterrupt:
-        say(f"gcs: interrupted; finished runs are in {folder / JOURNAL}, and the same command goes on from there")
-        return INTERRUPTED
-    except WorkersLost as error:
-        say(f"gcs: {error}; finished runs are in {folder / JOURNAL}, and the same command goes on from there")
-        return NOT_COMPLETED
-    results = Results.of(conducted, title=loaded.title, seeds=count, reference=loaded.reference)
+    workers: Workers = Local(jobs) if dask is None else Cluster(dask)  # a cluster that is not there leaves no folder
+    with closing(workers):
+        folder = output_folder(Path("runs") / f"experiment-{Path(name).stem}" if out is None else out, name)
+        try:
+            conducted = conduct(chosen, workers, folder=folder, console=stderr)
+        except KeyboardInterrupt:
+            say(f"gcs: interrupted; finished runs are in {folder / JOURNAL}, and the same command goes on from there")
+            return INTERRUPTED
+        except WorkersLost as error:
+            say(f"gcs: {error}; finished runs are in {folder / JOURNAL}, and the same command goes on from there")
+            return NOT_COMPLETED
+    results = Results.of(conducted, title=loaded.title, reference=loaded.reference, asked=asked)
     try:
         results.save(folder)
         pictures = draw(results, folder)
@@ -68,10 +76,18 @@ def experiment(
     if stdout is None:
         sys.stdout.write(results.json().decode() + "\n")
     else:
-        results.show(stdout)
+        show(results, stdout)
     _tell(results, say)
+    if conducted.others:
+        say(f"{folder / JOURNAL} holds {conducted.others} runs more, which were not asked for: they are in no table")
     say(f"written: {', '.join(str(folder / file) for file in (*FILES, *pictures))}")
     return NOT_COMPLETED if any(run.crashed for run in results.runs) else FLOWN
+
+
+def _command_line(name: str, seeds: int | None, only: Sequence[str]) -> str:
+    """All of it that decides what is flown."""
+    words = ["gcs", "experiment", name, *(() if seeds is None else ("--seeds", str(seeds)))]
+    return shlex.join([*words, *(word for pattern in only for word in ("--only", pattern))])
 
 
 def _chosen(every: list[Task], patterns: Sequence[str]) -> list[Task]:
@@ -96,7 +112,7 @@ def _tell(results: Results, say: Any) -> None:
         say(f"not completed: {len(incomplete) - MOST_NAMED} more runs, all in table.md")
     crashed = sum(run.crashed for run in results.runs)
     if crashed:
-        say(f"gcs: {crashed} runs ended in an error of this program; they count as not passed, and are flown again")
+        say(f"gcs: {crashed} runs ended in an error of this program; they are in no figure, and are flown again")
     if timing.runs_per_hour is not None:
         say(
             f"{timing.flown} runs in {timing.wall_s:.1f} s: {timing.runs_per_hour:.0f} runs/h, "

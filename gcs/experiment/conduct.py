@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,10 +34,12 @@ class Conducted:
     runs: list[RunResult]
     """In the order of the tasks."""
     timing: Timing
+    others: int = 0
+    """Runs that the journal holds besides."""
 
 
-def conduct(tasks: list[Task], workers: Callable[[], Workers], *, folder: Path, console: Console) -> Conducted:
-    """Fly what the folder's journal lacks. workers: hires them, if there is anything to fly.
+def conduct(tasks: list[Task], workers: Workers, *, folder: Path, console: Console) -> Conducted:
+    """Fly what the folder's journal lacks.
 
     Raises UnusableJournal, WorkersLost, and KeyboardInterrupt; whenever it ends, the finished runs are kept.
     """
@@ -52,23 +53,20 @@ def conduct(tasks: list[Task], workers: Callable[[], Workers], *, folder: Path, 
             words = f"{strangers} runs were flown by other sources than these, under the same version; they count"
             _say(console, f"{journal.path}: {words} all the same. Remove the file to fly them again.")
         if missing:
-            hired = workers()
-            count = hired.count
+            count = workers.count
             _say(console, f"{len(wanted)} runs, {kept} of them kept from before; workers: {count}")
-            try:
-                with Meter(console, total=len(wanted), kept=kept) as meter:
-                    for run in hired.map(fly_run, missing):
-                        journal.add(run)
-                        if run.crashed:
-                            crashed[run.key] = run
-                        meter.advance()
-            finally:
-                hired.close()
+            with Meter(console, total=len(wanted), kept=kept) as meter:
+                for run in workers.map(fly_run, missing):
+                    journal.add(run)
+                    if run.crashed:
+                        crashed[run.key] = run
+                    meter.advance()
+        others = len(journal.runs.keys() - wanted)
         outcome = journal.runs | crashed
     wall_s = time.perf_counter() - began
     pace = 3600 * len(missing) / wall_s if missing else None
     timing = Timing(len(missing), kept, count, round(wall_s, 3), pace)
-    return Conducted([outcome[task.key].named_as(task) for task in tasks], timing)
+    return Conducted([outcome[task.key].named_as(task) for task in tasks], timing, others)
 
 
 def _say(console: Console, words: str) -> None:

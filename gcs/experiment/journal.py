@@ -11,6 +11,8 @@ from gcs.experiment.run import RunResult
 from gcs.recording.writer import RecordingError
 
 JOURNAL = "runs.jsonl"
+BEGINNING = b'{"key":"'
+"""Of every line: half of one, which is all that may be cut off, is told by it."""
 
 
 class UnusableJournal(RecordingError):
@@ -60,14 +62,18 @@ class Journal:
     def _read(self) -> None:
         self._stream.seek(0)
         content = self._stream.read()
-        whole = content.rfind(b"\n") + 1
-        if whole < len(content):  # a process was killed while it wrote
-            os.ftruncate(self._stream.fileno(), whole)
-        for number, line in enumerate(content[:whole].splitlines(), start=1):
+        *whole, half = content.split(b"\n")
+        for number, line in enumerate(whole, start=1):
             try:
                 run = RunResult.of_line(line)
             except (ValueError, TypeError, KeyError, AttributeError):
-                raise UnusableJournal(
-                    f"{self.path}, line {number}: is no run of this version: {line[:60].decode(errors='replace')!r}"
-                ) from None
+                raise self._no_run(number, line) from None
             self.runs[run.key] = run
+        if not half.startswith(BEGINNING[: len(half)]):
+            raise self._no_run(len(whole) + 1, half)
+        if half:  # a process was killed while it wrote
+            os.ftruncate(self._stream.fileno(), len(content) - len(half))
+
+    def _no_run(self, number: int, line: bytes) -> UnusableJournal:
+        shown = line[:60].decode(errors="replace")
+        return UnusableJournal(f"{self.path}, line {number}: is no run of this version: {shown!r}")

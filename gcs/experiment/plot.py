@@ -54,6 +54,8 @@ class Figure:
 
 def _rate(cell: Cell) -> Mark | None:
     share: Share = cell.passed
+    if share.n == 0:
+        return None
     return Mark(100 * share.rate, 100 * share.low, 100 * share.high)
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import csv
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import orjson
-from rich import box
-from rich.table import Table
 
 from gcs.experiment.cells import MARGIN, Cell, cells, suites
 from gcs.experiment.conduct import Conducted, Timing
@@ -20,9 +20,6 @@ from gcs.statistics import PairedDifference, Share, Spread
 
 POINTS = f"{100 * MARGIN:g} points"
 FILES = ("table.md", "cells.csv", "runs.csv", "experiment.json")
-DOWN = "▼"
-LEFT_OUT = ("runs", "false alarms", "passed where")
-"""On a terminal."""
 OF_SEVERAL_FIGURES = (
     "heading_error_deg",
     "distance_to_target_m",
@@ -33,10 +30,31 @@ OF_SEVERAL_FIGURES = (
 
 
 @dataclass(frozen=True, slots=True)
+class Asked:
+    """What this call was to fly."""
+
+    command: str
+    only: tuple[str, ...]
+    """Suites and conditions; all, if empty."""
+    seeds: int
+    seeds_of_file: int
+
+    @property
+    def part(self) -> str | None:
+        """In words, where it is not the whole experiment."""
+        fewer = [f"seeds 1 to {self.seeds} of {self.seeds_of_file}"] if self.seeds < self.seeds_of_file else []
+        return "; ".join([*(f"only {pattern}" for pattern in self.only), *fewer]) or None
+
+
+@dataclass(frozen=True, slots=True)
 class Results:
-    """Of a whole experiment."""
+    """Of an experiment, or of the part of it that was asked for."""
 
     title: str
+    version: str
+    sources: dict[str, int]
+    """Runs by the digest of the sources that flew them, the most first."""
+    asked: Asked
     seeds: int
     reference: str | None
     cells: list[Cell]
@@ -46,11 +64,21 @@ class Results:
     timing: Timing
 
     @staticmethod
-    def of(conducted: Conducted, *, title: str, seeds: int, reference: str | None) -> Results:
+    def of(conducted: Conducted, *, title: str, reference: str | None, asked: Asked) -> Results:
         """All that can be said of these runs."""
         runs = conducted.runs
-        every, pooled = cells(runs, reference=reference), suites(runs, reference=reference)
-        return Results(title, seeds, reference, every, pooled, runs, conducted.timing)
+        return Results(
+            title=title,
+            version=version("trustr"),
+            sources=dict(Counter(run.code for run in runs).most_common()),
+            asked=asked,
+            seeds=asked.seeds,
+            reference=reference,
+            cells=cells(runs, reference=reference),
+            suites=suites(runs, reference=reference),
+            runs=runs,
+            timing=conducted.timing,
+        )
 
     @property
     def incomplete(self) -> list[RunResult]:
@@ -60,7 +88,7 @@ class Results:
     def json(self, option: int = 0) -> bytes:
         """One object: what is not a number is null."""
         said = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "runs"}
-        said["incomplete"] = [_which(run) | {"problem": run.problem} for run in self.incomplete]
+        said["incomplete"] = [_which(run) | {"problem": run.problem, "crashed": run.crashed} for run in self.incomplete]
         return orjson.dumps(said, option=option)
 
     def save(self, folder: Path) -> None:
@@ -70,46 +98,46 @@ class Results:
         _write_csv(folder / "runs.csv", [_flat_run(run) for run in self.runs])
         (folder / "experiment.json").write_bytes(self.json(orjson.OPT_INDENT_2) + b"\n")
 
-    def show(self, console: Any) -> None:
-        """The suites, their conditions pooled, in the columns that a terminal has room for."""
-        table = Table(title=self.title, title_justify="left", title_style="bold", box=box.SIMPLE, collapse_padding=True)
-        rows = [_row(cell.suite, cell, DOWN) for cell in self.suites]
-        columns = [place for place, name in enumerate(self._head("suite")) if not name.startswith(LEFT_OUT)]
-        for place in columns:
-            table.add_column(self._head("suite")[place], no_wrap=place > 0)
-        for row in rows:
-            table.add_row(*(row[place] for place in columns if place < len(row)))
-        console.print(table)
-        if any(cell.below_reference for cell in self.suites):
-            console.print(f"{DOWN}: {self._below}", highlight=False)
-
     @property
-    def _below(self) -> str:
+    def below(self) -> str:
         """What is said of an arm that falls short."""
         return f"below {self.reference} − {POINTS}"
 
     def _markdown(self) -> Iterator[str]:
         yield f"# {self.title}\n"
+        yield f"`{self.asked.command}`, trustr {self.version}: {self._flown_by}.\n"
+        if self.asked.part is not None:
+            yield f"A part of the experiment: {self.asked.part}.\n"
         yield f"{self.seeds} seeds; in brackets and after ±, 95 % intervals.\n"
         for suite in dict.fromkeys(cell.suite for cell in self.suites):
             every = [cell for cell in self.cells if cell.suite == suite]
             pooled = [cell for cell in self.suites if cell.suite == suite]
             yield f"## {suite}\n"
-            yield from _table(
-                self._head("condition"), (_row(cell.condition or "", cell, self._below) for cell in every)
-            )
+            yield from _table(self._head("condition"), (_row(cell.condition or "", cell, self.below) for cell in every))
             if len({cell.condition for cell in every}) > 1:
                 yield "\nAll conditions pooled:\n"
-                yield from _table(self._head("suite"), (_row(suite, cell, self._below) for cell in pooled))
+                yield from _table(self._head("suite"), (_row(suite, cell, self.below) for cell in pooled))
             yield ""
         if self.incomplete:
             yield "## Not completed\n"
             yield from (
-                f"- {run.suite}, {run.condition}, {run.arm}, seed {run.seed}: {run.problem}" for run in self.incomplete
+                f"- {run.suite}, {run.condition}, {run.arm}, seed {run.seed}: {run.problem}"
+                + ("; an error of the program, in no figure" if run.crashed else "")
+                for run in self.incomplete
             )
 
+    @property
+    def _flown_by(self) -> str:
+        """Two digests under one version are two programs."""
+        (most, count), *others = self.sources.items()
+        if not others:
+            return f"{count} runs, flown by sources {most}"
+        mixed = ", ".join(f"{digest} ({runs})" for digest, runs in others)
+        return f"{count} runs flown by sources {most}; {sum(runs for _, runs in others)} runs by others: {mixed}"
+
     def _head(self, first: str) -> tuple[str, ...]:
-        head = (first, "arm", "runs", "passed", "heading error", "distance", "found after", "false alarms")
+        flown = (first, "arm", "runs", "passed", "heading error", "distance", "closest", "not completed")
+        head = (*flown, "found after", "false alarms")
         if self.reference is None:
             return head
         return (*head, f"against {self.reference}", f"passed where {self.reference} did")
@@ -121,9 +149,11 @@ def _row(name: str, cell: Cell, below: str) -> tuple[str, ...]:
         name,
         cell.arm,
         f"{cell.passed.n}",
-        _share(cell.passed),
+        share(cell.passed),
         _spread(cell.heading_error_deg, "°"),
         _spread(cell.distance_to_target_m, " m"),
+        metres(cell.min_separation_m),
+        f"{cell.incomplete}" + (f", and {cell.crashed} crashed" if cell.crashed else ""),
         _found(cell),
         f"{cell.false_alarms}",
     )
@@ -131,15 +161,21 @@ def _row(name: str, cell: Cell, below: str) -> tuple[str, ...]:
         return row
     return (
         *row,
-        _difference(cell.against_reference) + (f", {below}" if cell.below_reference else ""),
-        f"{_share(cell.passed_where_reference_did)} of {cell.passed_where_reference_did.n}",
+        difference(cell.against_reference) + (f", {below}" if cell.below_reference else ""),
+        f"{share(cell.passed_where_reference_did)} of {cell.passed_where_reference_did.n}",
     )
 
 
-def _share(share: Share) -> str:
-    if share.n == 0:
+def share(found: Share) -> str:
+    """And its interval."""
+    if found.n == 0:
         return "–"
-    return f"{100 * share.rate:.0f} % [{100 * share.low:.0f}, {100 * share.high:.0f}]"
+    return f"{100 * found.rate:.0f} % [{100 * found.low:.0f}, {100 * found.high:.0f}]"
+
+
+def metres(value: float | None) -> str:
+    """Or a dash."""
+    return "–" if value is None else f"{value:.2f} m"
 
 
 def _spread(spread: Spread | None, unit: str) -> str:
@@ -152,18 +188,18 @@ def _spread(spread: Spread | None, unit: str) -> str:
 def _found(cell: Cell) -> str:
     if cell.detected is None:
         return "–"
-    median = "not found" if cell.detection_s is None else f"{cell.detection_s:.1f} s"
+    lost = "most not found" if cell.detected.count else "not found"
+    median = lost if cell.detection_s is None else f"{cell.detection_s:.1f} s"
     if cell.slowest_s is not None and cell.slowest_s != cell.detection_s:
         median += f", at most {cell.slowest_s:.1f} s"
     return f"{median} ({cell.detected.count}/{cell.detected.n})"
 
 
-def _difference(difference: PairedDifference | None) -> str:
-    if difference is None:
+def difference(found: PairedDifference | None) -> str:
+    """In points, and its interval; a dash where there is no pair."""
+    if found is None:
         return "–"
-    mean, low, high = (
-        f"{100 * share:+.0f}".replace("-", "−") for share in (difference.difference, difference.low, difference.high)
-    )
+    mean, low, high = (f"{100 * rate:+.0f}".replace("-", "−") for rate in (found.difference, found.low, found.high))
     return f"{mean} [{low}, {high}]"
 
 

@@ -132,7 +132,8 @@ def fly_run(task: Task) -> RunResult:
         if isinstance(error.__cause__, KeyboardInterrupt):  # inside JSBSim, Ctrl-C comes out as a SystemError
             raise error.__cause__ from None
         at = traceback.extract_tb(error.__traceback__)[-1]
-        trial = Trial(None, f"{type(error).__name__}: {error} ({Path(at.filename).name}:{at.lineno})")
+        words = " ".join(f"{type(error).__name__}: {error}".split())
+        trial = Trial(None, f"{words} ({Path(at.filename).name}:{at.lineno})")
         crashed = True
     score, scenario = trial.score, task.scenario
     heeded = trust_of(scenario) is not None

@@ -3,6 +3,7 @@
 import csv
 import fcntl
 import os
+import re
 import shutil
 import signal
 import socket
@@ -28,9 +29,11 @@ from gcs import cli
 from gcs.experiment import meter, run, workers
 from gcs.experiment.cells import cells, suites
 from gcs.experiment.conduct import Conducted, Timing
+from gcs.experiment.journal import BEGINNING, Journal, UnusableJournal
 from gcs.experiment.plot import MOST_ROWS, draw
-from gcs.experiment.results import Results
+from gcs.experiment.results import Asked, Results
 from gcs.experiment.run import RunResult, fly_run, tasks
+from gcs.experiment.terminal import show
 from gcs.flight import Flight
 from gcs.lockstep import Lockstep
 from gcs.loop import fly
@@ -39,7 +42,7 @@ from gcs.track import Tracker
 from gcs.trial import attempt
 from gcs.truth import Truth
 from scenarios import load
-from scenarios.experiment import load_experiment, parse_experiment
+from scenarios.experiment import experiment_names, load_experiment, parse_experiment
 
 SHORT = """
 title = "Short"
@@ -149,12 +152,12 @@ def test_a_key_is_the_flights_and_not_its_names():
     assert keys(SHORT) == keys(renamed)
     assert len(set(keys(SHORT))) == RUNS
     assert not set(keys(SHORT)) & set(keys(SHORT.replace("m=3", "m=3.1")))
-    fused = SHORT.replace('trust = "truth"', 'trust = "ratings"\nratings = "realistic"')
+    fused = SHORT.replace('trust = "truth"', 'trust = "fused"\nratings = "realistic"')
     assert not set(keys(fused)[1::2]) & set(keys(fused.replace("realistic", "lazy"))[1::2])
 
 
 def test_an_unknown_model_of_raters_is_refused_with_those_there_are(gcs, short):
-    short.write_text(SHORT + 'ratings = "psychic"\n', encoding="utf-8")
+    short.write_text(SHORT.replace('"truth"\n', '"fused"\n') + 'ratings = "psychic"\n', encoding="utf-8")
     code, _, err = gcs(short)
     assert code == 2
     assert "arm truth: ratings = 'psychic': allowed are " in err
@@ -256,6 +259,21 @@ def test_more_seeds_fly_only_what_is_new(gcs, flown, tmp_path):
             "flown": 2, "kept": 4, "workers": 1, "wall_s": 0, "runs_per_hour": 0,
         }  # fmt: skip
         assert {cell["suite"] for cell in orjson.loads(out)["cells"]} == {"fault-free"}
+
+
+def test_a_part_of_an_experiment_says_so_and_that_there_are_more_runs(gcs, flown, tmp_path):
+    with copy_of(flown, tmp_path, runs=RUNS) as folder:
+        code, out, err = gcs(flown[0], "--seeds", 1, "--only", "fault-*", "--out", folder, "--json")
+        assert code == 0
+        assert orjson.loads(out)["asked"] == {
+            "command": f"gcs experiment {flown[0]} --seeds 1 --only 'fault-*'",
+            "only": ["fault-*"], "seeds": 1, "seeds_of_file": 2,
+        }  # fmt: skip
+        assert "runs.jsonl holds 6 runs more, which were not asked for" in err
+        head = (folder / "table.md").read_text(encoding="utf-8").partition("##")[0]
+        assert "A part of the experiment: only fault-*; seeds 1 to 1 of 2." in head
+        gcs(flown[0], "--out", folder)
+        assert "A part" not in (folder / "table.md").read_text(encoding="utf-8")
 
 
 def test_flights_that_are_the_same_under_two_names_are_flown_once(gcs, flown, tmp_path):
@@ -372,6 +390,23 @@ def test_runs_of_other_sources_under_the_same_version_count_but_are_told(gcs, fl
         assert f"{RUNS} runs were flown by other sources than these" in err
 
 
+def test_results_name_the_version_the_command_and_the_sources_that_flew(flown):
+    path, folder, said, _ = flown
+    (digest,) = {orjson.loads(line)["code"] for line in lines(folder)}
+    assert (said["version"], said["sources"]) == (version("trustr"), {digest: RUNS})
+    assert said["asked"]["command"] == f"gcs experiment {path}"
+    head = (folder / "table.md").read_text(encoding="utf-8").partition("##")[0]
+    assert f"`gcs experiment {path}`, trustr {version('trustr')}: 8 runs, flown by sources {digest}.\n" in head
+
+
+def test_results_of_several_sources_say_how_many_runs_are_whose(tmp_path):
+    runs = [*made("a", [1, 1, 1], code="new"), *made("b", [1], code="old")]
+    results_of(runs).save(tmp_path)
+    table = (tmp_path / "table.md").read_text(encoding="utf-8")
+    assert "3 runs flown by sources new; 1 runs by others: old (1)." in table
+    assert orjson.loads((tmp_path / "experiment.json").read_bytes())["sources"] == {"new": 3, "old": 1}
+
+
 def test_a_journal_that_holds_something_else_is_refused(gcs, short, tmp_path):
     (tmp_path / "runs.jsonl").write_text('{"my": "notes"}\n', encoding="utf-8")
     code, out, err = gcs(short, "--out", tmp_path)
@@ -379,6 +414,20 @@ def test_a_journal_that_holds_something_else_is_refused(gcs, short, tmp_path):
     assert one_sentence(err)
     assert "runs.jsonl, line 1" in err
     assert (tmp_path / "runs.jsonl").read_text(encoding="utf-8") == '{"my": "notes"}\n'
+
+
+@pytest.mark.parametrize("notes", [b"my notes, without an end", b'{"my": "notes"}\n{"ke', b'{"key":"n'])
+def test_only_half_a_run_is_cut_off_a_journal(notes, tmp_path):
+    path = tmp_path / "runs.jsonl"
+    path.write_bytes(notes)
+    if notes.startswith(BEGINNING):
+        with Journal(tmp_path) as journal:
+            assert journal.runs == {}
+        assert path.read_bytes() == b""
+        return
+    with pytest.raises(UnusableJournal, match="is no run of this version"), Journal(tmp_path):
+        pass
+    assert path.read_bytes() == notes
 
 
 def test_two_experiments_do_not_write_into_one_folder(gcs, short, tmp_path):
@@ -530,6 +579,13 @@ def test_without_dask_installed_the_sentence_says_how_to_get_it(gcs, short, tmp_
     assert "pip install 'trustr[dask]'" in err
 
 
+def test_a_cluster_that_is_not_there_leaves_no_folder(gcs, short, tmp_path):
+    code, _, err = gcs(short, "--dask", "nonsense", "--out", tmp_path / "out")
+    assert code == 2
+    assert one_sentence(err)
+    assert not (tmp_path / "out").exists()
+
+
 # What goes wrong
 
 
@@ -558,14 +614,18 @@ def test_an_error_of_the_program_is_no_result_and_is_flown_again(gcs, short, tmp
 
     def attempt_with_a_defect(scenario, *, seed, ratings):
         if scenario.control.rule == "average":
-            raise ZeroDivisionError("by nothing")
+            raise ZeroDivisionError("by\n  nothing")
         return real(scenario, seed=seed, ratings=ratings)
 
     monkeypatch.setattr(run, "attempt", attempt_with_a_defect)
     code, out, err = gcs(short, "--seeds", 1, "--jobs", 1, "--out", tmp_path, "--json")
     assert code == 3
     assert "ZeroDivisionError: by nothing (test_experiment.py:" in orjson.loads(out)["incomplete"][0]["problem"]
-    assert "2 runs ended in an error of this program" in err
+    assert "2 runs ended in an error of this program; they are in no figure" in err
+    assert [(cell["crashed"], cell["passed"]["n"]) for cell in orjson.loads(out)["suites"]] == [(1, 0), (0, 1)] * 2
+    assert "seed 1: ZeroDivisionError: by nothing (test_experiment.py:" in (table := said_in(tmp_path / "table.md"))
+    assert "; an error of the program, in no figure" in table
+    assert "nan" not in table
     assert len(lines(tmp_path)) == 2
     monkeypatch.undo()
     code, out, _ = gcs(short, "--seeds", 1, "--jobs", 1, "--out", tmp_path, "--json")
@@ -590,6 +650,7 @@ def test_ctrl_c_inside_jsbsim_is_still_ctrl_c(monkeypatch):
         (("base", "--jobs", "0"), "--jobs 0: must be a number of processes"),
         (("base", "--only", "bse"), "--only bse: there is no such suite or condition; there are base/transit 40 %"),
         (("base", "--out", "/dev/null/x"), "--out /dev/null/x: cannot be written"),
+        (("base", "--jobs", "2", "--dask", "tcp://there:1"), "--jobs 2: with --dask, the cluster's workers fly"),
     ],
 )
 def test_a_wrong_word_is_one_sentence(gcs, words, said):
@@ -610,6 +671,15 @@ def made(arm, passes, *, suite="s", condition="c", **changes):
         crashed=False, wall_s=1.0, cpu_s=1.0, code="c0de",
     )  # fmt: skip
     return [replace(one, seed=seed, passed=bool(passed), **changes) for seed, passed in enumerate(passes, start=1)]
+
+
+def results_of(runs, *, title="Many", reference=None, seeds=3):
+    asked = Asked("gcs experiment many", (), seeds, seeds)
+    return Results.of(Conducted(runs, Timing(1, 0, 1, 1.0, 1.0)), title=title, reference=reference, asked=asked)
+
+
+def said_in(path):
+    return path.read_text(encoding="utf-8")
 
 
 def by_arm(found):
@@ -674,6 +744,44 @@ def test_means_are_over_the_flights_that_came_to_their_read_out_and_passes_over_
     assert (cell.heading_error_deg, cell.min_separation_m) == (None, None)
 
 
+def test_errors_of_the_program_are_in_no_figure_and_nor_are_their_pairs():
+    broken = {"problem": "ZeroDivisionError", "crashed": True, "heading_error_deg": None, "distance_to_target_m": None}
+    truth = [*made("truth", [1, 1, 1]), *(replace(run, seed=4) for run in made("truth", [0], **broken))]
+    auto = [replace(run, **broken) if run.seed == 1 else run for run in made("auto", [0, 0, 1, 1], faulty=1)]
+    found = by_arm(cells([*truth, *auto], reference="truth"))
+    assert (found["truth"].passed.n, found["truth"].passed.rate, found["truth"].crashed) == (3, 1.0, 1)
+    assert (found["auto"].passed.n, found["auto"].crashed, found["auto"].incomplete) == (3, 1, 0)
+    assert found["auto"].detected.n == 3
+    assert (found["auto"].against_reference.pairs, found["auto"].against_reference.lost) == (2, 1)
+    assert found["auto"].passed_where_reference_did.n == 2
+
+
+def test_where_nothing_but_errors_came_of_it_there_is_no_rate(tmp_path):
+    runs = [*made("truth", [1, 1]), *made("auto", [0, 0], problem="ZeroDivisionError", crashed=True)]
+    found = results_of(runs, reference="truth")
+    found.save(tmp_path)
+    draw(found, tmp_path)
+    assert orjson.loads(found.json())["cells"][1]["passed"]["rate"] is None
+    assert "| c | auto | 0 | – |" in said_in(tmp_path / "table.md")
+
+
+def test_the_table_shows_the_closest_approach_and_who_did_not_arrive(tmp_path):
+    runs = made("a", [0, 1], min_separation_m=0.914) + made("b", [0], problem="lost") + made("b", [1, 1])
+    runs += made("c", [0], problem="a defect", crashed=True) + made("c", [1])
+    results_of(runs).save(tmp_path)
+    rows = [[cell.strip() for cell in row.split("|")[1:-1]] for row in said_in(tmp_path / "table.md").splitlines()]
+    head, _, *arms = (row for row in rows if len(row) > 5)
+    shown = {row[1]: (row[head.index("closest")], row[head.index("not completed")]) for row in arms}
+    assert shown == {"a": ("0.91 m", "0"), "b": ("1.50 m", "1"), "c": ("1.50 m", "0, and 1 crashed")}
+
+
+@pytest.mark.parametrize(("found", "said"), [(1, "most not found, at most 3.2 s (1/3)"), (0, "not found (0/3)")])
+def test_where_most_are_not_found_the_table_says_most(found, said, tmp_path):
+    runs = made("a", [1] * found, faulty=1, detected={5: 3.2}) + made("a", [0] * (3 - found), faulty=1)
+    results_of(runs).save(tmp_path)
+    assert f"| {said} |" in said_in(tmp_path / "table.md")
+
+
 def test_rules_that_use_no_trust_find_nobody_and_alarm_nobody():
     every = tasks(parse_experiment(SHORT, source="x"), seeds=1)
     averaged = fly_run(every[0])
@@ -687,7 +795,55 @@ def test_a_line_of_the_journal_reads_back_as_the_run_it_was():
     assert one.line().count(b"\n") == 1
 
 
-# Pictures and progress
+# Terminal, pictures and progress
+
+
+def shown(results, width):
+    console = Console(file=StringIO(), width=width)
+    show(results, console)
+    return console.file.getvalue()
+
+
+@pytest.mark.parametrize("width", [100, 110])
+@pytest.mark.parametrize("name", experiment_names())
+def test_a_terminal_shows_every_name_and_figure_of_what_ships(name, width):
+    experiment = load_experiment(name)
+    runs = [
+        one
+        for condition in experiment.conditions
+        for arm in experiment.arms_of(condition)
+        for one in made(
+            arm.name, [arm.name == experiment.reference] * 30, suite=condition.suite, condition=condition.name,
+            heading_error_deg=123.456, distance_to_target_m=123.456, faulty=2, detected={4: 15.0, 5: 15.0},
+        )
+    ]  # fmt: skip
+    said = shown(results_of(runs, title=experiment.title, reference=experiment.reference), width)
+    assert "…" not in said
+    assert all(len(line) <= width for line in said.splitlines())
+    for suite in experiment.suite:
+        assert f"\n{suite.name} " in said or f"\n{suite.name}\n" in said
+    for arm in experiment.arm:
+        assert all(word in said.split() for word in arm.name.split())
+    rows = [line for line in said.splitlines() if " %" in line]
+    assert len(rows) == len({(run.suite, run.arm) for run in runs})
+    for row in rows:
+        assert re.search(r"(0|100) % \[\d+, \d+\] +123.46° +123.46 m +1.50 m +\d+/\d+ +15.0 s", row)
+    if experiment.reference is not None:
+        assert "−100 [−100, " in said
+
+
+def test_names_are_shown_as_they_are_whatever_they_hold(tmp_path):
+    runs = [*made("x [/z]", [1], suite="[bold]"), *made("[red]", [0], suite="[bold]")]
+    said = shown(results_of(runs, title="[/b] $x$", reference="x [/z]"), 120)
+    for words in ("x [/z]", "[bold]", "[red]", "[/b] $x$", "against x [/z]"):
+        assert words in said
+    draw(results_of(runs, title="[/b] $x$", reference="x [/z]"), tmp_path)
+
+
+def test_a_narrow_terminal_wraps_and_loses_nothing():
+    said = shown(results_of(made("ratings, heterogeneous", [1] * 3) + made("b", [1] * 3), reference="b"), 50)
+    assert "…" not in said
+    assert all(len(line) <= 50 for line in said.splitlines())
 
 
 def large(count):
@@ -699,7 +855,7 @@ def large(count):
         for arm in arms
         for done in made(arm, [1, 0, arm == "truth"], suite=f"a suite of many words {number}", condition=condition)
     ]
-    return Results.of(Conducted(runs, Timing(1, 0, 1, 1.0, 1.0)), title="Many", seeds=3, reference="truth")
+    return results_of(runs, reference="truth")
 
 
 @pytest.mark.parametrize("count", [1, MOST_ROWS // 2, 25])
@@ -739,7 +895,7 @@ def test_elsewhere_than_on_a_terminal_progress_is_a_line_every_so_often(monkeypa
 
 
 def test_a_single_seed_has_no_interval_and_nothing_says_nan(tmp_path):
-    found = Results.of(Conducted(made("a", [1]), Timing(1, 0, 1, 1.0, 1.0)), title="One", seeds=1, reference=None)
+    found = results_of(made("a", [1]), title="One", seeds=1)
     assert isnan(found.cells[0].heading_error_deg.ci95)
     found.save(tmp_path)
     draw(found, tmp_path)
