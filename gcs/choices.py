@@ -23,6 +23,10 @@ Overrides = Annotated[
 ]
 
 
+MOST_SEED = 2**63 - 1
+"""JSON's integers end there for most who read them, and for those who write our summaries."""
+
+
 class BadUsageError(ValueError):
     """An option that cannot be obeyed, in one sentence."""
 
@@ -80,9 +84,11 @@ AS_IT_IS = Choices()
 
 
 def check_seed(seed: int | None) -> None:
-    """Raises BadUsageError for a seed that no generator takes."""
+    """Raises BadUsageError for a seed that no generator takes, or no summary holds."""
     if seed is not None and seed < 0:
         raise BadUsageError(f"--seed {seed}: must not be negative")
+    if seed is not None and seed > MOST_SEED:
+        raise BadUsageError(f"--seed {seed}: must not be above {MOST_SEED}")
 
 
 def check_many(seeds: int | None, jobs: int) -> None:

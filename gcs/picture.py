@@ -221,10 +221,13 @@ def _verdict(result: Score | None, panel: Panel) -> str:
     if result is None:
         return "ended before its read-out"
     passed, expect = "passes" if result.passed else "FAILS", panel.scenario.expect
-    return (
+    told = (
         f"{passed}: heading off by {result.heading_error_deg:.1f}° (allowed {expect.heading_error_deg:g}°), "
         f"{result.distance_to_target_m:.1f} m from target ({expect.distance_to_target_m:g} m)"
     )
+    if result.min_separation_m >= expect.min_separation_m:
+        return told
+    return f"{told}\nrobots as close as {result.min_separation_m:.2f} m (allowed {expect.min_separation_m:g} m)"
 
 
 def _trust(axes: Any, panel: Panel, *, first: bool) -> None:

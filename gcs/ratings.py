@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import math
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -40,11 +41,12 @@ def chosen(name_or_path: str, scenario: Scenario, *, seed: int) -> tuple[Rating,
     if name_or_path in MODELS:
         return schedule(name_or_path, scenario, seed)
     path = Path(name_or_path)
-    if not path.exists():
-        raise RatingsError(
-            f"no ratings {name_or_path!r}: neither a file nor a model of who gives them ({', '.join(MODELS)})"
-        )
-    return read(path, count=scenario.swarm.count)
+    with suppress(OSError):  # too long a name, say
+        if path.exists():
+            return read(path, count=scenario.swarm.count)
+    raise RatingsError(
+        f"no ratings {_shown(name_or_path)}: neither a file nor a model of who gives them ({', '.join(MODELS)})"
+    )
 
 
 def schedule(model: str, scenario: Scenario, seed: int) -> tuple[Rating, ...]:
@@ -89,7 +91,8 @@ def parse(line: bytes, *, count: int, live: bool = False) -> Rating:
     except orjson.JSONDecodeError as error:
         raise RatingsError(f"not valid JSON: {error.msg} at column {error.colno}") from None
     if not isinstance(told, dict):
-        raise RatingsError(f"{_shown(told)}: must be a JSON object with the keys {', '.join(KEYS)}")
+        keys = ", ".join(LIVE_KEYS if live else KEYS)
+        raise RatingsError(f"{_shown(told)}: must be a JSON object with the keys {keys}")
     if live:
         _check_keys(told, LIVE_KEYS)
     else:

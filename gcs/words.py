@@ -35,6 +35,8 @@ def _fault(fault: Fault) -> str:
 def _what(fault: Fault) -> str:
     robot = f"robot {fault.vehicle}"
     match fault:
+        case MotorDegradation(max_speed_fraction=1.0) if fault.offset_fraction:
+            return f"{robot} pushed to its left by {fault.offset_fraction:.0%} of cruise"
         case MotorDegradation():
             return f"{robot} at {fault.max_speed_fraction:.0%} speed"
         case RotorFault():
