@@ -3,11 +3,13 @@
 import shutil
 import tomllib
 
+import numpy as np
 import orjson
 import pytest
-from flights import SHORT, fly_and_record, recorded, scratch
+from flights import SHORT, fly_and_record, recorded, rewritten, scratch, told
 
 from gcs import cli
+from gcs.recording.reader import steered
 from scenarios import load
 from scenarios.models import Control, Trust
 
@@ -99,6 +101,25 @@ def refused(result, said):
 
 def test_nothing_of_a_recording_can_be_changed(gcs):
     refused(gcs(recorded("demo").path, "--set", "vehicle.lag_s=1"), "--set vehicle.lag_s=1: a recording has been flown")
+
+
+def test_of_telemetry_older_than_three_ticks_nothing_is_learnt():
+    stale = {40: 0.31, 41: 0.3}
+
+    def age(_place, topic, _time_ns, data):
+        content = orjson.loads(data) if topic == "/swarm/state" else {}
+        if content.get("tick") in ticks:
+            content["age_s"][4] = ticks[content["tick"]]
+            return orjson.dumps(content)
+        return data
+
+    flight = recorded("demo")
+    begins = told(flight, "/mission")[0]["tick"]
+    ticks = {begins + after: age_s for after, age_s in stale.items()}
+    _, steered_ticks = steered(rewritten(flight.path, age))
+    known = {tick: np.isfinite(velocity).all(1).tolist() for tick, _, velocity, _ in steered_ticks}
+    assert known[begins + 40] == [True] * 4 + [False, True]
+    assert known[begins + 41] == [True] * 6
 
 
 def test_a_recording_in_which_something_fails_is_refused(gcs):

@@ -48,9 +48,11 @@ def test_a_rating_of_a_file_counts_at_the_first_tick_at_or_after_its_time():
     assert [row["tick"] - begins for row in told(flight, "/ratings")] == [30, 31, 50]
 
 
-@pytest.mark.xfail(strict=True, reason="the mission's first tick asks for ratings before it knows that it is one")
-def test_a_rating_at_mission_start_counts():
-    assert len(told(rated((0.0, 5, 1), (1.0, 5, 1)), "/ratings")) == 2
+def test_a_rating_at_mission_start_counts_at_its_first_tick():
+    flight = rated((0.0, 5, 1), (1.0, 5, 1))
+    begins = told(flight, "/mission")[0]["tick"]
+    assert [row["tick"] - begins for row in told(flight, "/ratings")] == [0, 10]
+    assert told(flight, "/trust")[0]["trust"][4] == pytest.approx(trust_of(UNTOLD + SAYS))
 
 
 def test_it_is_recorded_with_its_rater_and_with_the_trust_that_it_left():
@@ -69,6 +71,7 @@ def test_what_is_said_while_joining_climbing_and_running_up_still_counts_when_th
     turns, said = told(flight, "/tick"), told(flight, "/ratings")
     assert [turns[tick]["phase"] for tick in ticks] == ["joining", "taking off", "running up"]
     assert [(row["tick"], row["time_s"]) for row in said] == [(tick, None) for tick in ticks]
+    assert said[0]["trust"] == pytest.approx([trust_of(UNTOLD + SAYS * (row == 4)) for row in range(6)])
     begins = told(flight, "/mission")[0]["tick"]
     left = sum(SAYS * exp(-(begins - tick) * 0.1 / AGE_OUT_S) for tick in ticks)
     assert told(flight, "/trust")[0]["trust"][4] == pytest.approx(trust_of(UNTOLD + left))
@@ -119,7 +122,6 @@ def test_an_adversary_who_slanders_a_healthy_swarm_does_not_lose_it():
     assert flight.summary.passed
 
 
-@pytest.mark.xfail(strict=True, reason="before the mission ratings may say 3.0, and behaviour no more than 2.94")
 def test_an_adversary_who_begins_before_the_mission_does_no_more():
     slander = tuple(Rating("adversary", vehicle, 1) for vehicle in range(1, 7))
     flight = fly_and_record("demo", *SHORT, FUSED, ratings=(), events=lambda: slander)

@@ -182,13 +182,26 @@ def test_a_rule_that_cannot_be_flown_is_refused_before_anything_is_made(gcs, wri
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_a_rule_that_fails_in_the_air_lands_the_swarm_and_says_why(gcs, written, tmp_path):
-    name = written(
-        "def f(heard, _): return agreed(heard, heard.time_s + normalised(heard.graph, heard.graph.distance + 1))"
-    )
+FAILS = "def f(heard, _): return agreed(heard, heard.time_s + normalised(heard.graph, heard.graph.distance + 1))"
+LEAVES = """
+import sys
+def f(heard, _):
+    if heard.time_s > 1.0:
+        sys.exit("enough")
+    return agreed(heard, normalised(heard.graph, heard.graph.distance + 1))
+"""
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [(FAILS, "its weights for vehicle 1 sum to"), (LEAVES, "it raised SystemExit: enough at")],
+    ids=["weights", "sys.exit"],
+)
+def test_a_rule_that_fails_in_the_air_lands_the_swarm_and_says_why(gcs, written, tmp_path, source, said):
+    name = written(source)
     code, out, err = gcs("run", "demo", *BRIEFLY, "--controller", f"{name}:f", "--out", tmp_path / "flown", "--json")
     result = orjson.loads(out)
     assert code == 3
-    assert f"control.rule = '{name}:f': its weights for vehicle 1 sum to" in result["problem"]
+    assert f"control.rule = '{name}:f': {said}" in result["problem"]
     assert "Traceback" not in err
     assert result["passed"] is False

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from flights import column, recorded, told
 
+from gcs.control import settings
 from scenarios import load
+from scenarios.models import RULES
 
 AUTO = 'trust.source="auto"'
 RECOMMENDED = 'control.profile="recommended"'
@@ -101,6 +103,13 @@ def test_both_leaders_may_fail_one_after_the_other():
     ]
     assert flight.summary.passed
     assert flight.summary.false_alarms == 0
+
+
+@pytest.mark.parametrize("rule", RULES)
+def test_what_trust_does_besides_weighing_is_no_part_of_the_rules_of_others(rule):
+    chosen = settings(load("transit", overrides=[f"control.rule={rule}", RECOMMENDED, 'trust.beyond_repair="hold"']))
+    ours = rule == "trust-r"
+    assert (chosen.hand_over, chosen.leave_behind, chosen.berth > 0.0) == (ours, ours, ours)
 
 
 def test_a_baseline_hands_nothing_over_and_leaves_nobody_behind():
