@@ -157,7 +157,7 @@ def test_a_key_is_the_flights_and_not_its_names():
 
 
 def test_an_unknown_model_of_raters_is_refused_with_those_there_are(gcs, short):
-    short.write_text(SHORT.replace('"truth"\n', '"fused"\n') + 'ratings = "psychic"\n', encoding="utf-8")
+    short.write_text(SHORT.replace('trust = "truth"', 'trust = "fused"') + 'ratings = "psychic"\n', encoding="utf-8")
     code, _, err = gcs(short)
     assert code == 2
     assert "arm truth: ratings = 'psychic': allowed are " in err
