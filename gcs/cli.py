@@ -166,7 +166,9 @@ def reproduce(
 
 @app.command
 def experiment(
-    file: Annotated[str, Parameter(help="An experiment's name, or the path of a TOML file.")],
+    file: Annotated[
+        str, Parameter(help="base, false-alarms, faults, further, supervisors, or the path of a TOML file.")
+    ],
     /,
     *,
     seeds: Annotated[int | None, Parameter(help="Flights a condition and arm: seeds 1 to this.")] = None,

@@ -41,11 +41,8 @@ def lowered(roles: Roles, swarm: Swarm, position_ne: Array) -> Array:
 
 
 def settled(velocity_ned: Array, roles: Roles) -> Array:
-    """Set-points (N, 3) m/s with those who are out of the others' way standing still, and sinking no more."""
-    gone = roles.gone
-    velocity = np.where(gone[:, None], 0.0, velocity_ned)
-    velocity[:, 2] = np.where(gone, np.minimum(velocity_ned[:, 2], 0.0), velocity_ned[:, 2])
-    return velocity
+    """Set-points (N, 3) m/s with those who are out of the others' way standing still, whatever height they report."""
+    return np.where(roles.gone[:, None], 0.0, velocity_ned)
 
 
 def _under_another(swarm: Swarm, position_ne: Array) -> Flags:

@@ -61,7 +61,7 @@ def hand_over(roles: Roles, *, trust: Array, heard: Flags, offset_ne: Array, pla
     silent_s = np.where(heard, 0.0, roles.silent_s + dt)
     roles = replace(roles, silent_s=silent_s)
     fit = heard & ~roles.left
-    lost = (trust < LOSES) | (silent_s >= MISSED_S) | roles.left
+    lost = (trust < LOSES) | (silent_s >= MISSED_S - 1e-9) | roles.left
     if not lost[roles.leaders].any():
         return roles
     leaders = roles.leaders.copy()
