@@ -67,7 +67,7 @@ def _fly(flights: list[Task], jobs: int) -> float:
 
 def _conduct(flights: list[Task], jobs: int) -> None:
     with tempfile.TemporaryDirectory() as folder:
-        conduct(flights, lambda: Local(jobs), folder=Path(folder), console=Console(quiet=True))
+        conduct(flights, Local(jobs), folder=Path(folder), console=Console(quiet=True))
 
 
 def _pace(flights: list[Task], seconds: float) -> str:
