@@ -151,9 +151,7 @@ def _by_axis(heard: Heard, weigh: Callable[[Graph, Array], Array]) -> Agreement:
 
 
 def _median_weights(graph: Graph, said: Array) -> Array:
-    ordered, begins = graph.sorted_by_receiver(said)
-    among = np.diff(begins)
-    lower, upper = ordered[begins[:-1] + (among - 1) // 2], ordered[begins[:-1] + among // 2]
+    lower, upper = graph.middle_by_receiver(said)
     value = said[graph.sender]
     is_lower = (value == lower[graph.receiver]).astype(np.float64)
     is_upper = (value == upper[graph.receiver]).astype(np.float64)

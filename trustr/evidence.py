@@ -217,9 +217,8 @@ def neighbourhood(graph: Graph, velocity_ne: Array, trusted: Flags) -> Array:
     heard = Graph(graph.count, graph.receiver[counted], graph.sender[counted], graph.distance[counted])
     median = np.empty_like(velocity_ne)
     for axis in range(2):
-        ordered, begins = heard.sorted_by_receiver(velocity_ne[:, axis])
-        among = np.diff(begins)
-        median[:, axis] = 0.5 * (ordered[begins[:-1] + (among - 1) // 2] + ordered[begins[:-1] + among // 2])
+        lower, upper = heard.middle_by_receiver(velocity_ne[:, axis])
+        median[:, axis] = 0.5 * (lower + upper)
     return median
 
 

@@ -49,6 +49,12 @@ class Graph:
         np.cumsum(np.bincount(self.receiver, minlength=self.count), out=begins[1:])
         return values[by_rank[order % self.count]], begins
 
+    def middle_by_receiver(self, values: Array) -> tuple[Array, Array]:
+        """The middle two of what each robot hears, values (N,): (N,) each, and the same of an odd number."""
+        ordered, begins = self.sorted_by_receiver(values)
+        among = np.diff(begins)
+        return ordered[begins[:-1] + (among - 1) // 2], ordered[begins[:-1] + among // 2]
+
     def without(self, senders: npt.NDArray[np.bool_]) -> Graph:
         """The same, with these robots (N,) speaking to themselves only."""
         if not senders.any():
