@@ -44,12 +44,13 @@ def of_scenario(scenario: Scenario, *, seeds: int, console: Any) -> Identified:
 def of_recording(path: Path) -> Identified:
     """Identify the vehicles of a recording in which nothing failed. Raises UnreadableRecording."""
     path = located(path)
-    wrong = [fault for fault in read(path).scenario.fault if fault.blamed is not None]
+    scenario = read(path).scenario
+    wrong = [fault for fault in scenario.fault if fault.blamed is not None]
     if wrong:
         robot = f"robot {wrong[0].vehicle}"
         raise UnreadableRecording(f"{path}: it takes a flight in which nothing fails, and in this one {robot} does")
-    period_s, ticks = steered(path)
-    samples = [sample for sample in _stretches(ticks) if len(sample.velocity_ne) * period_s >= SHORTEST_S]
+    period_s = scenario.time.period_s
+    samples = [sample for sample in _stretches(steered(path)) if len(sample.velocity_ne) * period_s >= SHORTEST_S]
     if not samples:
         raise UnreadableRecording(
             f"{path}: holds no {SHORTEST_S:g} s of set-points to every vehicle with all of them heard"
@@ -104,7 +105,7 @@ class _Logbook:
     @property
     def sample(self) -> Sample:
         """All of it."""
-        return Sample(*(np.array(column) for column in zip(*self.entries, strict=True)))
+        return _sample(self.entries)
 
 
 def _flown(scenario: Scenario, seed: int) -> Sample:
@@ -122,10 +123,15 @@ def _stretches(ticks: Iterator[SteeredTick]) -> Iterator[Sample]:
     for number, commanded, velocity, position in ticks:
         whole = bool(np.isfinite(commanded).all() and np.isfinite(velocity).all() and np.isfinite(position).all())
         if stretch and (not whole or number != (before or 0) + 1):
-            yield Sample(*(np.array(column) for column in zip(*stretch, strict=True)))
+            yield _sample(stretch)
             stretch = []
         if whole:
             stretch.append((commanded, velocity, position))
         before = number
     if stretch:
-        yield Sample(*(np.array(column) for column in zip(*stretch, strict=True)))
+        yield _sample(stretch)
+
+
+def _sample(ticks: Sequence[tuple[Array, ...]]) -> Sample:
+    """Ticks of (commanded, velocity, position) as one stretch."""
+    return Sample(*(np.array(column) for column in zip(*ticks, strict=True)))

@@ -157,12 +157,8 @@ SteeredTick = tuple[int, Table, Table, Table]
 """(tick, set-points sent, velocities, positions), (N, 2) each: m/s and m, NaN where there is none."""
 
 
-def steered(path: Path) -> tuple[float, Iterator[SteeredTick]]:
-    """The tick's length [s], and every tick at which set-points flowed, in order. Raises UnreadableRecording."""
-    return read(path).scenario.time.period_s, _steered(path)
-
-
-def _steered(path: Path) -> Iterator[SteeredTick]:
+def steered(path: Path) -> Iterator[SteeredTick]:
+    """Every tick at which set-points flowed, in order. Raises UnreadableRecording."""
     setpoint: dict[str, Any] | None = None
     with _readable(path), path.open("rb") as stream:
         reader = NonSeekingReader(stream, validate_crcs=True, record_size_limit=RECORD_SIZE_LIMIT)

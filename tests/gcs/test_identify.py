@@ -116,7 +116,7 @@ def test_of_telemetry_older_than_three_ticks_nothing_is_learnt():
     flight = recorded("demo")
     begins = told(flight, "/mission")[0]["tick"]
     ticks = {begins + after: age_s for after, age_s in stale.items()}
-    _, steered_ticks = steered(rewritten(flight.path, age))
+    steered_ticks = steered(rewritten(flight.path, age))
     known = {tick: np.isfinite(velocity).all(1).tolist() for tick, _, velocity, _ in steered_ticks}
     assert known[begins + 40] == [True] * 4 + [False, True]
     assert known[begins + 41] == [True] * 6
