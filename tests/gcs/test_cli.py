@@ -14,7 +14,6 @@ import orjson
 import pytest
 from flights import GCS, SHORT, recorded, start
 
-from gcs import cli
 from gcs.replay import decide_again
 from gcs.session import output_folder
 
@@ -25,18 +24,6 @@ CONTRACT = {
 BESIDES = {"profile", "scored_on", "problem", "faults", "swarm_heading_error_deg", "rejected_frames", "left_behind"}
 """Keys that the contract does not have yet."""
 BRIEFLY = [word for override in SHORT for word in ("--set", override)]
-
-
-@pytest.fixture
-def gcs(capfd):
-    """Run `gcs` with these words in this process: (exit code, stdout, stderr)."""
-
-    def run(*words):
-        with pytest.raises(SystemExit) as ended:
-            cli.main([str(word) for word in words])
-        return ended.value.code or 0, *capfd.readouterr()
-
-    return run
 
 
 def one_sentence(words):

@@ -12,7 +12,6 @@ import orjson
 import pytest
 from flights import GCS, SHORT
 
-from gcs import cli
 from gcs.control import settings
 from gcs.rules import RuleError, rule
 from scenarios import load
@@ -42,18 +41,6 @@ def written(tmp_path, monkeypatch):
         return name
 
     return write
-
-
-@pytest.fixture
-def gcs(capfd):
-    """Run `gcs` with these words in this process: (exit code, stdout, stderr)."""
-
-    def run(*words):
-        with pytest.raises(SystemExit) as ended:
-            cli.main([str(word) for word in words])
-        return ended.value.code or 0, *capfd.readouterr()
-
-    return run
 
 
 def tried(name):
