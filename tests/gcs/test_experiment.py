@@ -13,6 +13,7 @@ import threading
 import time
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from io import StringIO
 from itertools import pairwise
@@ -25,7 +26,6 @@ import pytest
 from flights import GCS
 from rich.console import Console
 
-from gcs import cli
 from gcs.experiment import meter, run, workers
 from gcs.experiment.cells import cells, suites
 from gcs.experiment.conduct import Conducted, Timing
@@ -91,15 +91,9 @@ def flown(tmp_path_factory):
 
 
 @pytest.fixture
-def gcs(capfd):
-    """Run `gcs` with these words in this process: (exit code, stdout, stderr)."""
-
-    def experiment(*words):
-        with pytest.raises(SystemExit) as ended:
-            cli.main(["experiment", *(str(word) for word in words)])
-        return ended.value.code or 0, *capfd.readouterr()
-
-    return experiment
+def gcs(gcs):
+    """Run `gcs experiment` with these words."""
+    return partial(gcs, "experiment")
 
 
 def command(*words):

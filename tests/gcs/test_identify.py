@@ -2,13 +2,13 @@
 
 import shutil
 import tomllib
+from functools import partial
 
 import numpy as np
 import orjson
 import pytest
 from flights import SHORT, fly_and_record, recorded, rewritten, scratch, told
 
-from gcs import cli
 from gcs.recording.reader import steered
 from scenarios import load
 from scenarios.models import Control, Trust
@@ -18,15 +18,9 @@ RESPONSE = {"response_delay_s": (0.147, 0.03), "response_lag_s": (0.298, 0.04)}
 
 
 @pytest.fixture
-def gcs(capfd):
-    """Run `gcs identify` with these words in this process: (exit code, stdout, stderr)."""
-
-    def run(*words):
-        with pytest.raises(SystemExit) as ended:
-            cli.main(["identify", *map(str, words)])
-        return ended.value.code or 0, *capfd.readouterr()
-
-    return run
+def gcs(gcs):
+    """Run `gcs identify` with these words."""
+    return partial(gcs, "identify")
 
 
 def check(found):
