@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -167,19 +166,14 @@ def _cells(row: Row) -> tuple[str, ...]:
         row.scenario,
         "none" if row.severity is None else f"{row.severity:.0%}",
         row.controller,
-        f"{heading.mean:.2f}°{_plus_minus(heading)}",
+        f"{heading.mean:.2f}°{heading.plus_minus}",
         f"{heading.p90:.2f}°",
-        f"{distance.mean:.2f} m{_plus_minus(distance)}",
+        f"{distance.mean:.2f} m{distance.plus_minus}",
         f"{distance.p90:.2f} m",
         f"{row.pass_rate:.0%}",
         f"{row.min_separation_m:.1f} m",
         "–" if paper is None else f"{paper['heading_error_deg']:g}°, {paper['distance_to_target_m']:g} m",
     )
-
-
-def _plus_minus(spread: Spread) -> str:
-    """One seed has no interval."""
-    return "" if math.isnan(spread.ci95) else f" ± {spread.ci95:.2f}"
 
 
 def _markdown(rows: Iterable[Row]) -> str:

@@ -21,6 +21,11 @@ class Spread:
     """Half the 95 % interval of the mean (Student's t)."""
     p90: float
 
+    @property
+    def plus_minus(self) -> str:
+        """The interval behind the mean, in words; one seed has none."""
+        return "" if math.isnan(self.ci95) else f" ± {self.ci95:.2f}"
+
     @staticmethod
     def of(values: Sequence[float]) -> Spread:
         """Of one value a seed."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields
@@ -181,8 +180,7 @@ def metres(value: float | None) -> str:
 def _spread(spread: Spread | None, unit: str) -> str:
     if spread is None:
         return "–"
-    half = "" if math.isnan(spread.ci95) else f" ± {spread.ci95:.2f}"
-    return f"{spread.mean:.2f}{half}{unit}"
+    return f"{spread.mean:.2f}{spread.plus_minus}{unit}"
 
 
 def _found(cell: Cell) -> str:
