@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any, Final
 
-from pymavlink.dialects.v20 import common as dialect
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from fdm import modes
 from fdm.modes import Failsafe, Mode, Outcome, Pilot, Setpoint, Situation

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from pymavlink.dialects.v20 import common as dialect
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from fdm.modes import READY_AFTER, Mode, Pilot, Severity, Situation
 from fdm.personality import Personality

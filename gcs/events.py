@@ -2,10 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 LAND = "land"
 """End the flight."""
+HOLD = "hold"
+"""End the mission, and stay where you are until somebody says land."""
+
+_TAKE_BACK = re.compile(r"take back (\d+)")
+
+
+def take_back(system: int) -> str:
+    """The word with which the operator takes a vehicle back that a pilot, or its autopilot, took from us."""
+    return f"take back {system}"
+
+
+def taken_back(event: Event) -> int | None:
+    """The system id that an event takes back, if it is such a word."""
+    match = _TAKE_BACK.fullmatch(event) if isinstance(event, str) else None
+    return int(match[1]) if match else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,4 +38,4 @@ class Rating:
 
 
 Event = str | Rating
-"""A word of the operator (LAND), or a rating."""
+"""A word of the operator (LAND, HOLD, take_back), or a rating."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from pymavlink.dialects.v20 import common as dialect
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from gcs.commands import (
     Arm,

@@ -18,7 +18,7 @@ from gcs.flight import Flight
 from gcs.flight_state import Phase
 from gcs.loop import Tick
 from gcs.track import Parts, parts_of
-from wire.modes import px4_mode_name
+from wire.modes import mode_name
 
 REFRESH_S = 0.1
 """Wall time between two pictures: a fast simulation is not slowed by its display."""
@@ -99,7 +99,7 @@ class Display:
             table.add_row(
                 str(system),
                 _part(system, self._parts),
-                _mode(bool(swarm.armed[row]), int(swarm.custom_mode[row])),
+                _mode(bool(swarm.armed[row]), int(swarm.autopilot[row]), int(swarm.custom_mode[row])),
                 _number(north, "m"),
                 _number(east, "m"),
                 _number(-swarm.position_ned[row, 2], "m"),
@@ -149,8 +149,8 @@ def _clock(tick: Tick, flight: Flight) -> str:
     return f"{mission_s:6.1f} of {flight.plan.read_out_s:.1f} s"
 
 
-def _mode(armed: bool, custom_mode: int) -> Text:
-    return Text(px4_mode_name(custom_mode)) if armed else Text("disarmed", style="dim")
+def _mode(armed: bool, autopilot: int, custom_mode: int) -> Text:
+    return Text(mode_name(autopilot, custom_mode)) if armed else Text("disarmed", style="dim")
 
 
 def _number(value: float, unit: str) -> str:

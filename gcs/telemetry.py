@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from pymavlink.dialects.v20.common import MAVError
+from pymavlink.dialects.v20.ardupilotmega import MAVError
 
 from gcs import messages
 from wire.frames import Frame, decode
@@ -46,6 +46,8 @@ class Swarm:
     """(N, 3) rad."""
     heartbeat_ns: Integers
     """(N,) when the autopilot was last alive."""
+    autopilot: Integers
+    """(N,) MAV_AUTOPILOT of the heartbeat; 0 until it came."""
     custom_mode: Integers
     """(N,) the autopilot's number of its mode."""
     armed: Flags
@@ -71,6 +73,7 @@ class Swarm:
             origin=np.full((n, 3), np.nan),
             attitude_rpy=np.full((n, 3), np.nan),
             heartbeat_ns=np.full(n, NEVER),
+            autopilot=np.zeros(n, np.int64),
             custom_mode=np.zeros(n, np.int64),
             armed=np.zeros(n, bool),
             ready=np.zeros(n, bool),
@@ -150,6 +153,7 @@ REBOOTED_MS = 2000
 def _heartbeat(draft: _Draft, row: int, frame: Frame) -> None:
     beat = decode(frame)
     draft.set("heartbeat_ns", row, frame.time_ns)
+    draft.set("autopilot", row, beat.autopilot)
     draft.set("custom_mode", row, beat.custom_mode)
     draft.set("armed", row, bool(beat.base_mode & messages.ARMED))
 

@@ -11,15 +11,15 @@ ROOT = Path(__file__).parent.parent
 ROOMS = ("aircraft", "fdm", "gcs", "scenarios", "trustr", "wire")
 THIRD_PARTIES = {
     "numpy", "scipy", "pydantic", "pymavlink", "fastcrc", "jsbsim", "mcap", "pymap3d", "cyclopts", "rich",
-    "matplotlib", "mpl_toolkits", "joblib", "orjson", "distributed",
+    "matplotlib", "mpl_toolkits", "joblib", "orjson", "distributed", "serial",
 }  # fmt: skip
 ALLOWED = {
     "aircraft": set(),
     "trustr": {"numpy", "scipy"},
-    "wire": {"pymavlink", "fastcrc"},
+    "wire": {"pymavlink", "fastcrc", "serial"},
     "scenarios": {"pydantic", "numpy"},
     "fdm": {"wire", "scenarios", "aircraft", "jsbsim", "numpy", "pymap3d", "pymavlink", "cyclopts"},
-    "gcs": {"trustr", "wire", "scenarios", "fdm"} | THIRD_PARTIES - {"jsbsim"},
+    "gcs": {"trustr", "wire", "scenarios", "fdm"} | THIRD_PARTIES - {"jsbsim", "serial"},
 }
 ONLY_IN = {"fdm": "gcs/lockstep.py", "jsbsim": "fdm/vehicle.py"}
 """Of all files outside its own room, the one that may import it."""

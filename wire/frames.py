@@ -11,7 +11,7 @@ import struct
 from typing import Any, NamedTuple
 
 from fastcrc import crc16
-from pymavlink.dialects.v20 import common as dialect
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 MAGIC_1, MAGIC_2 = 0xFE, 0xFD
 HEADER_1, HEADER_2, CRC, SIGNATURE = 6, 10, 2, 13

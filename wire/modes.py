@@ -1,6 +1,7 @@
 """Flight modes as autopilots number them in HEARTBEAT.custom_mode and MAV_CMD_DO_SET_MODE.
 
 PX4: https://docs.px4.io/main/en/flight_modes/ and px4_custom_mode.h: main mode in bits 16–23, sub mode in bits 24–31.
+ArduCopter: https://ardupilot.org/copter/docs/flight-modes.html; custom_mode is the mode's number.
 """
 
 from __future__ import annotations
@@ -8,6 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+
+PX4, ARDUPILOT = 12, 3
+"""MAV_AUTOPILOT of the two whose modes we know."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,18 +29,43 @@ class Px4Mode:
 
 PX4_MODES: Mapping[str, Px4Mode] = MappingProxyType(
     {
-        "offboard": Px4Mode(6),
+        "manual": Px4Mode(1),
+        "altitude": Px4Mode(2),
+        "position": Px4Mode(3),
         "takeoff": Px4Mode(4, 2),
         "hold": Px4Mode(4, 3),
+        "mission": Px4Mode(4, 4),
+        "return": Px4Mode(4, 5),
         "land": Px4Mode(4, 6),
+        "offboard": Px4Mode(6),
     }
 )
-"""The modes we fly, by our own names."""
+"""By our own names."""
+
+ARDUCOPTER_MODES: Mapping[str, int] = MappingProxyType(
+    {
+        "stabilize": 0,
+        "altitude hold": 2,
+        "auto": 3,
+        "guided": 4,
+        "loiter": 5,
+        "return": 6,
+        "land": 9,
+        "position hold": 16,
+        "brake": 17,
+    }
+)
+"""By our own names: param2 of DO_SET_MODE."""
+
+_NAMES = {
+    PX4: {mode.custom_mode: name for name, mode in PX4_MODES.items()},
+    ARDUPILOT: {number: name for name, number in ARDUCOPTER_MODES.items()},
+}
 
 
-def px4_mode_name(custom_mode: int) -> str:
-    """Our name for a PX4 custom mode, or its numbers where we have none."""
-    for name, mode in PX4_MODES.items():
-        if mode.custom_mode == custom_mode:
-            return name
-    return f"mode {custom_mode >> 16 & 0xFF}.{custom_mode >> 24 & 0xFF}"
+def mode_name(autopilot: int, custom_mode: int) -> str:
+    """Our name for an autopilot's mode, or its number where we have none."""
+    name = _NAMES.get(autopilot, {}).get(custom_mode)
+    if name is not None:
+        return name
+    return f"mode {custom_mode >> 16 & 0xFF}.{custom_mode >> 24 & 0xFF}" if autopilot == PX4 else f"mode {custom_mode}"

@@ -2,7 +2,7 @@
 
 import math
 
-from pymavlink.dialects.v20 import common as dialect
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from fdm.endpoint import Endpoint
 from fdm.shaping import shape_of

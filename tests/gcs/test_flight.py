@@ -35,6 +35,7 @@ class Fleet:
             position_ned=np.array(places),
             velocity_ned=np.zeros((n, 3)),
             ready=np.ones(n, bool),
+            autopilot=np.full(n, 12),
             custom_mode=np.full(n, MODE["hold"]),
             battery=np.full(n, 0.9),
         )

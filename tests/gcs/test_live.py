@@ -10,7 +10,7 @@ import numpy as np
 import orjson
 import pytest
 from flights import FDM, GCS, REPETITIONS, messages, recorded, start
-from pymavlink.dialects.v20 import common as dialect
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from gcs.live import Live
 from gcs.recording.reader import read

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from flights import Severed, fly_and_record
-from pymavlink.dialects.v20 import common as dialect
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from gcs.lockstep import EPOCH_NS, Lockstep
 from gcs.mission import plan
