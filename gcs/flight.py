@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gcs import leaving, losses, mission
-from gcs.autopilots import Px4
+from gcs.autopilots import Fleet
 from gcs.beliefs import Beliefs, Seen
 from gcs.commands import Beat, Command, SetVelocity
 from gcs.control import settings
@@ -78,7 +78,7 @@ class Flight:
         self._beliefs = Beliefs(scenario, self._settings, rated=ratings is not None)
         self._leader = mission.PROFILES[scenario.control.profile]
         position_s = scenario.time.period_s / (scenario.time.positions_per_tick or 1)
-        self._autopilot = Px4(height_m=scenario.swarm.altitude_m, position_s=position_s)
+        self._fleet = Fleet(height_m=scenario.swarm.altitude_m, position_s=position_s)
         self._limits = Limits(scenario.limits.speed_m_s, scenario.limits.acceleration_m_s2)
         self._period_s = scenario.time.period_s
         self._run_up_ticks = scenario.time.ticks(scenario.mission.run_up_s)
@@ -133,7 +133,7 @@ class Flight:
             position_ne=self._position_ne(state, swarm),
             velocity_ne=swarm.velocity_ned[:, :2],
             position_ns=swarm.position_ns,
-            heard=self._autopilot.obeying(swarm) & swarm.fresh(now_ns, within_ns=STALE_NS),
+            heard=self._fleet.obeying(swarm) & swarm.fresh(now_ns, within_ns=STALE_NS),
             left=state.memory.roles.left if state.memory else np.zeros(len(swarm.ids), bool),
             ratings=said,
         )
@@ -163,7 +163,7 @@ class Flight:
         return state
 
     def _join(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
-        missing = [system for row, system in enumerate(swarm.ids) if not self._autopilot.known(swarm, row)]
+        missing = [system for row, system in enumerate(swarm.ids) if not self._fleet.known(swarm, row)]
         if not missing:
             offset, run_up_m = self._offset_ne, self._run_up_m(self._run_up_ticks)
             ahead = self.plan.segments[0].velocity_ne / self.scenario.mission.cruise_m_s
@@ -174,30 +174,22 @@ class Flight:
             verb = "was" if len(missing) == 1 else "were"
             problem = f"{losses.vehicles(missing)} {verb} not heard, or not ready to arm, within {JOIN_S:g} s"
             return self._land(failed(state, problem, Phase.DONE), swarm, now_ns)
-        return self._ask(
-            state,
-            swarm,
-            lambda row: (
-                self._autopilot.subscribe()
-                if swarm.heartbeat_ns[row] > 0 and not self._autopilot.known(swarm, row)
-                else ()
-            ),
-        )
+        return self._ask(state, swarm, lambda row: self._fleet.next_to_know(swarm, row))
 
     def _climb(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
-        if all(self._autopilot.hovering(swarm, row) for row in range(len(swarm.ids))):
+        if all(self._fleet.hovering(swarm, row) for row in range(len(swarm.ids))):
             return self._take_control(entered(state, Phase.TAKE_CONTROL), swarm, now_ns)
-        return self._ask(state, swarm, lambda row: _some(self._autopilot.next_to_fly(swarm, row)))
+        return self._ask(state, swarm, lambda row: _some(self._fleet.next_to_fly(swarm, row)))
 
     def _take_control(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
         streaming_s = (state.tick - state.phase_tick) * self._period_s
         height_error = np.abs(swarm.position_ned[:, 2] + self.scenario.swarm.altitude_m)
         hovering = (np.linalg.norm(swarm.velocity_ned, axis=1) < STILL) & (height_error < LEVEL)
-        if streaming_s > STREAM_FIRST_S and self._autopilot.obeying(swarm).all() and hovering.all():
+        if streaming_s > STREAM_FIRST_S and self._fleet.obeying(swarm).all() and hovering.all():
             return self._run_up(entered(state, Phase.RUN_UP), swarm, now_ns)
         ask: Commands = []
         if streaming_s >= STREAM_FIRST_S:
-            state, ask, _ = self._ask(state, swarm, lambda row: _some(self._autopilot.next_to_obey(swarm, row)))
+            state, ask, _ = self._ask(state, swarm, lambda row: _some(self._fleet.next_to_obey(swarm, row)))
         state, commands, diagnosis = self._steer(
             state, swarm, np.zeros((len(swarm.ids), 2)), self._overview(state, swarm)
         )
@@ -222,7 +214,7 @@ class Flight:
         time_s = self._mission_s(state)
         if time_s >= self.plan.read_out_s - 1e-9:
             return self._land(entered(state, Phase.LAND), swarm, now_ns)
-        obeying = self._autopilot.obeying(swarm)
+        obeying = self._fleet.obeying(swarm)
         flying = obeying & ~losses.down(swarm, self.scenario.swarm.altitude_m)
         diagnosis = self._overview(state, swarm)
         heard = flying & swarm.fresh(now_ns, within_ns=STALE_NS)
@@ -250,7 +242,7 @@ class Flight:
         roles, commands = decision.roles, list[tuple[int, Command]]()
         if self.scenario.trust.beyond_repair == "land":
             state, commands, _ = self._ask(
-                state, swarm, lambda row: _some(self._autopilot.next_to_land(swarm, row)) if roles.gone[row] else ()
+                state, swarm, lambda row: _some(self._fleet.next_to_land(swarm, row)) if roles.gone[row] else ()
             )
             commanded = commanded & ~roles.gone
         lower = leaving.lowered(roles, swarm, diagnosis.position_ne)
@@ -269,7 +261,7 @@ class Flight:
         return self._ask(
             state,
             swarm,
-            lambda row: _some(self._autopilot.next_to_land(swarm, row)) if state.phase is Phase.LAND else (),
+            lambda row: _some(self._fleet.next_to_land(swarm, row)) if state.phase is Phase.LAND else (),
         )
 
     def _ask(self, state: FlightState, swarm: Swarm, what: Callable[[int], tuple[Command, ...]]) -> Step:

@@ -1,0 +1,85 @@
+"""A fleet of whatever autopilots: each vehicle is asked in the way of its own, which its heartbeat names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from gcs.autopilots.protocol import Autopilot
+from gcs.autopilots.px4 import Px4
+from gcs.commands import Command
+from gcs.telemetry import NEVER, Flags, Swarm
+from wire.modes import PX4
+
+
+class Fleet:
+    """Every function is about one vehicle, a row of the swarm, or about all of them, (N,)."""
+
+    def __init__(self, *, height_m: float, position_s: float) -> None:
+        """height_m: above each vehicle's home;  position_s: how often each tells its position and velocity."""
+        self._kinds: Mapping[int, Autopilot] = {PX4: Px4(height_m=height_m, position_s=position_s)}
+
+    def next_to_know(self, swarm: Swarm, row: int) -> tuple[Command, ...]:
+        """Everything that must be known before arming and has not been told."""
+        kind = self._kind(swarm, row)
+        return () if kind is None or self.known(swarm, row) else kind.streams()
+
+    def known(self, swarm: Swarm, row: int) -> bool:
+        """All that must be known before arming has been told, and the vehicle is ready to be armed."""
+        kind = self._kind(swarm, row)
+        if kind is None or not kind.ready(swarm)[row]:
+            return False
+        return bool(np.isfinite(swarm.position_ned[row]).all() and np.isfinite(swarm.origin[row]).all())
+
+    def next_to_fly(self, swarm: Swarm, row: int) -> Command | None:
+        """Towards hovering at height; None where it is under way, or there."""
+        kind = self._kind(swarm, row)
+        return None if kind is None else kind.next_to_fly(swarm, row)
+
+    def hovering(self, swarm: Swarm, row: int) -> bool:
+        """At height, and take-off is over."""
+        kind = self._kind(swarm, row)
+        return kind is not None and kind.hovering(swarm, row)
+
+    def next_to_obey(self, swarm: Swarm, row: int) -> Command | None:
+        """Towards flying our set-points, which must already be coming."""
+        kind = self._kind(swarm, row)
+        return None if kind is None else kind.next_to_obey(swarm, row)
+
+    def next_to_land(self, swarm: Swarm, row: int) -> Command | None:
+        """Towards standing on the ground with rotors off."""
+        kind = self._kind(swarm, row)
+        return None if kind is None else kind.next_to_land(swarm, row)
+
+    def next_to_hold(self, swarm: Swarm, row: int) -> Command | None:
+        """Towards staying where it is, at its height, without us."""
+        kind = self._kind(swarm, row)
+        return None if kind is None else kind.next_to_hold(swarm, row)
+
+    def obeying(self, swarm: Swarm) -> Flags:
+        """(N,) who flies our set-points."""
+        return self._each(swarm, lambda kind: kind.obeying(swarm))
+
+    def ours(self, swarm: Swarm) -> Flags:
+        """(N,) in a mode that we use ourselves: in any other, somebody else flies."""
+        return self._each(swarm, lambda kind: kind.ours(swarm))
+
+    def landing(self, swarm: Swarm) -> Flags:
+        """(N,) coming down to land."""
+        return self._each(swarm, lambda kind: kind.landing(swarm))
+
+    def _kind(self, swarm: Swarm, row: int) -> Autopilot | None:
+        """None before the vehicle's first heartbeat, and where we do not know its kind."""
+        if swarm.heartbeat_ns[row] == NEVER:
+            return None
+        return self._kinds.get(int(swarm.autopilot[row]))
+
+    def _each(self, swarm: Swarm, asked: Callable[[Autopilot], Flags]) -> Flags:
+        """(N,) every vehicle by the answer of its own kind; False for kinds that we do not know."""
+        answer = np.zeros(len(swarm.ids), bool)
+        for number, kind in self._kinds.items():
+            rows = swarm.autopilot == number
+            if rows.any():
+                answer |= rows & asked(kind)
+        return answer

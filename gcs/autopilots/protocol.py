@@ -1,0 +1,67 @@
+"""What an autopilot is to a flight, whichever it is."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from gcs.commands import Command
+from gcs.telemetry import Flags, Swarm
+
+AT_HEIGHT = 0.3
+"""m: off the height asked for."""
+
+
+class Autopilot(Protocol):
+    """One kind of autopilot. Rows are those of the swarm; a vehicle of another kind is not asked about."""
+
+    def streams(self) -> tuple[Command, ...]:
+        """What to ask of a vehicle when it is first heard: what it shall send, and how often."""
+        ...
+
+    def next_to_fly(self, swarm: Swarm, row: int) -> Command | None:
+        """Towards hovering at height."""
+        ...
+
+    def hovering(self, swarm: Swarm, row: int) -> bool:
+        """At height, and take-off is over."""
+        ...
+
+    def next_to_obey(self, swarm: Swarm, row: int) -> Command | None:
+        """Towards flying our set-points, which must already be coming."""
+        ...
+
+    def next_to_land(self, swarm: Swarm, row: int) -> Command | None:
+        """Towards standing on the ground with rotors off."""
+        ...
+
+    def next_to_hold(self, swarm: Swarm, row: int) -> Command | None:
+        """Towards staying where it is, at its height, without us."""
+        ...
+
+    def ready(self, swarm: Swarm) -> Flags:
+        """(N,) whose own checks before arming pass."""
+        ...
+
+    def obeying(self, swarm: Swarm) -> Flags:
+        """(N,) who flies our set-points."""
+        ...
+
+    def ours(self, swarm: Swarm) -> Flags:
+        """(N,) in a mode that we use ourselves: in any other, somebody else flies."""
+        ...
+
+    def landing(self, swarm: Swarm) -> Flags:
+        """(N,) coming down to land."""
+        ...
+
+
+def in_modes(swarm: Swarm, *modes: int) -> Flags:
+    """(N,) whose heartbeat shows one of these."""
+    return np.asarray(np.isin(swarm.custom_mode, modes))
+
+
+def at_height(swarm: Swarm, row: int, height_m: float) -> bool:
+    """Whether a vehicle is as high above its home as it was asked to be."""
+    return bool(abs(-swarm.position_ned[row, 2] - height_m) < AT_HEIGHT)
