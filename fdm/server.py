@@ -8,8 +8,9 @@ from typing import Literal
 
 from fdm.world import World
 from wire.clock import WallClock
-from wire.connection import Address, Connection, ConnectionRefused, UdpPort
+from wire.connection import Address, Connection, ConnectionRefused
 from wire.frames import Framer, target_system
+from wire.ports import UdpPort
 
 CATCH_UP_S = 0.25
 """Simulated seconds at one go, at most, when physics has fallen behind."""

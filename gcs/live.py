@@ -6,9 +6,10 @@ import selectors
 from collections.abc import Iterable, Sequence
 
 from wire.clock import WallClock
-from wire.connection import Address, Connection, UdpPort
+from wire.connection import Address, Connection
 from wire.frames import Frame, Framer
 from wire.ids import AUTOPILOT
+from wire.ports import UdpPort
 
 
 class Live:

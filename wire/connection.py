@@ -1,24 +1,35 @@
-"""Connection strings and the UDP sockets behind them.
+"""Connection strings: how people name a link to vehicles.
 
-"udpin:0.0.0.0:14550" binds and answers whoever speaks; "udpout:127.0.0.1:14550" speaks first. "udp:" is "udpin:", and
-each may be written with "//" as MAVSDK does. A range of ports, "udpin:0.0.0.0:14550-14555", stands for one string each.
+    udpin:0.0.0.0:14550        binds, and answers whoever speaks ("udp:" is the same)
+    udpout:127.0.0.1:14550     speaks first
+    tcp:127.0.0.1:5760         calls, and calls again where nobody answers or the line breaks ("tcpout:" is the same)
+    tcpin:0.0.0.0:5760         is called, by one or several
+    serial:/dev/ttyUSB0:57600  a telemetry radio or a cable; 57600 if absent, and "/dev/ttyUSB0:57600" is enough
+
+Each may be written with "//" as MAVSDK does. A range of ports, "udpin:0.0.0.0:14550-14555", stands for one string each.
+The sockets behind them are in `wire.ports`.
 """
 
 from __future__ import annotations
 
 import re
-import socket
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, cast
+
+Kind = Literal["udpin", "udpout", "tcp", "tcpin", "serial"]
 
 Address = tuple[str, int]
+"""Host and port of a peer."""
 
-DATAGRAM = 2048
-"""Bytes: more than any MAVLink datagram over Ethernet has."""
-RECEIVE_BUFFER = 4 << 20
-"""Bytes asked of the kernel, so that a fleet's telemetry survives a slow tick."""
-DRAIN_AT_MOST = 4096
-"""Datagrams taken at one go: a flood must not keep the caller from its work."""
+USUAL_BITS_PER_S = 57_600
+"""Of a telemetry radio as it is sold, and of an autopilot's telemetry port as it is delivered."""
+SLOWEST, FASTEST = 1_200, 12_000_000
+"""Bits a second that a serial line may be asked for."""
+
+_ALIASES = {"udp": "udpin", "tcpout": "tcp"}
+_KINDS: tuple[Kind, ...] = ("udpin", "udpout", "tcp", "tcpin", "serial")
+_CALLERS = ("udpout", "tcp")
+"""Those that need somebody to speak to."""
 
 
 class ConnectionRefused(ValueError):
@@ -29,75 +40,66 @@ class ConnectionRefused(ValueError):
 class Connection:
     """A parsed connection string."""
 
-    kind: Literal["udpin", "udpout"]
-    host: str
-    port: int
+    kind: Kind
+    host: str = ""
+    """Of the network kinds."""
+    port: int = 0
+    device: str = ""
+    """Of a serial line."""
+    bits_per_s: int | None = None
+    """Of a serial line; the others are as fast as their network."""
 
     def __str__(self) -> str:
+        if self.kind == "serial":
+            return f"serial:{self.device}:{self.bits_per_s}"
         return f"{self.kind}:{self.host}:{self.port}"
 
 
 def parse(text: str) -> list[Connection]:
     """The connections a string stands for. Raises ConnectionRefused."""
-    match = re.fullmatch(r"(\w+):(?://)?([^:/]*):(\d+)(?:-(\d+))?", text)
+    if text.startswith("/"):
+        return [_serial(text, text)]
+    match = re.fullmatch(r"(\w+):(?://)?(.+)", text)
     if match is None:
-        raise ConnectionRefused(f"{text!r}: must read like udpin:0.0.0.0:14550 or udpout:127.0.0.1:14550")
-    kind, host, first, last = match[1], match[2] or "0.0.0.0", int(match[3]), int(match[4] or match[3])
-    if kind not in ("udpin", "udpout", "udp"):
-        raise ConnectionRefused(f"{text!r}: {kind} is not a kind of link; allowed are udpin, udp (the same) and udpout")
+        raise _unreadable(text)
+    kind = _ALIASES.get(match[1], match[1])
+    if kind not in _KINDS:
+        raise ConnectionRefused(
+            f"{text!r}: {match[1]} is not a kind of link; allowed are {', '.join(_KINDS)}, udp (as udpin) "
+            "and tcpout (as tcp)"
+        )
+    if kind == "serial":
+        return [_serial(text, match[2])]
+    return _network(text, cast(Kind, kind), match[2])
+
+
+def _network(text: str, kind: Kind, place: str) -> list[Connection]:
+    match = re.fullmatch(r"([^:/]*):(\d+)(?:-(\d+))?", place)
+    if match is None:
+        raise _unreadable(text)
+    host, first, last = match[1], int(match[2]), int(match[3] or match[2])
     if not 1 <= first <= last <= 65535:
         raise ConnectionRefused(f"{text!r}: ports must be 1 to 65535, the first of a range not above the last")
-    if kind == "udpout" and not match[2]:
-        raise ConnectionRefused(f"{text!r}: udpout needs a host to speak to, as in udpout:127.0.0.1:14550")
-    one = Connection("udpout" if kind == "udpout" else "udpin", host, first)
+    if kind in _CALLERS and not host:
+        raise ConnectionRefused(f"{text!r}: {kind} needs a host to speak to, as in {kind}:127.0.0.1:{first}")
+    one = Connection(kind, host or "0.0.0.0", first)
     return [replace(one, port=port) for port in range(first, last + 1)]
 
 
-class UdpPort:
-    """A non-blocking UDP socket that hands out whole datagrams with their sender."""
+def _serial(text: str, place: str) -> Connection:
+    match = re.fullmatch(r"(/\S*?[^/:\s])(?::(\d+))?", place)
+    if match is None:
+        raise ConnectionRefused(f"{text!r}: a serial line must read like serial:/dev/ttyUSB0:{USUAL_BITS_PER_S}")
+    bits_per_s = int(match[2] or USUAL_BITS_PER_S)
+    if not SLOWEST <= bits_per_s <= FASTEST:
+        raise ConnectionRefused(
+            f"{text!r}: {bits_per_s} bits/s is no speed of a serial line; allowed are {SLOWEST} to {FASTEST}"
+        )
+    return Connection("serial", device=match[1], bits_per_s=bits_per_s)
 
-    def __init__(self, connection: Connection) -> None:
-        self.connection = connection
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setblocking(False)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
-        address = (connection.host, connection.port)
-        try:
-            if connection.kind == "udpin":
-                self._socket.bind(address)
-            else:
-                self._socket.connect(address)
-        except OSError as error:
-            self._socket.close()
-            raise ConnectionRefused(f"{connection}: {error.strerror or error}") from None
 
-    def fileno(self) -> int:
-        """For `select`."""
-        return self._socket.fileno()
-
-    def receive(self) -> list[tuple[bytes, Address]]:
-        """Datagrams that wait, oldest first, at most DRAIN_AT_MOST of them."""
-        got: list[tuple[bytes, Address]] = []
-        for _ in range(DRAIN_AT_MOST):
-            try:
-                got.append(self._socket.recvfrom(DATAGRAM))
-            except BlockingIOError:
-                break
-            except OSError:  # what became of a datagram we sent (nobody listens, no way there) is told here, once each
-                continue
-        return got
-
-    def send(self, data: bytes, to: Address | None = None) -> bool:
-        """Send one datagram, to `to` or, on udpout, to its one peer. False where the kernel would not take it."""
-        try:
-            if self.connection.kind == "udpout" or to is None:
-                self._socket.send(data)
-            else:
-                self._socket.sendto(data, to)
-        except OSError:  # nobody listens there, no network, a full buffer: the link is as good as its next datagram
-            return False
-        return True
-
-    def close(self) -> None:
-        """Give the port back."""
-        self._socket.close()
+def _unreadable(text: str) -> ConnectionRefused:
+    return ConnectionRefused(
+        f"{text!r}: must read like udpin:0.0.0.0:14550, udpout:127.0.0.1:14550, tcp:127.0.0.1:5760, "
+        f"tcpin:0.0.0.0:5760 or serial:/dev/ttyUSB0:{USUAL_BITS_PER_S}"
+    )

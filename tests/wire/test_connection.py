@@ -1,10 +1,8 @@
-"""Connection strings, and the UDP ports behind them."""
-
-import socket
+"""Connection strings: what is understood, and what is refused in which words."""
 
 import pytest
 
-from wire.connection import Connection, ConnectionRefused, UdpPort, parse
+from wire.connection import Connection, ConnectionRefused, parse
 
 UNDERSTOOD = [
     ("udpin:0.0.0.0:14550", "udpin:0.0.0.0:14550"),
@@ -17,9 +15,20 @@ UNDERSTOOD = [
     ("udpout:drone-1.local:1", "udpout:drone-1.local:1"),
     ("udpin:127.0.0.1:65535", "udpin:127.0.0.1:65535"),
     ("udpin:127.0.0.1:14550-14550", "udpin:127.0.0.1:14550"),
+    ("tcp:127.0.0.1:5760", "tcp:127.0.0.1:5760"),
+    ("tcp://127.0.0.1:5760", "tcp:127.0.0.1:5760"),
+    ("tcpout://sitl.local:5760", "tcp:sitl.local:5760"),
+    ("tcpin:0.0.0.0:5760", "tcpin:0.0.0.0:5760"),
+    ("tcpin://:5760", "tcpin:0.0.0.0:5760"),
+    ("serial:/dev/ttyUSB0:115200", "serial:/dev/ttyUSB0:115200"),
+    ("serial:///dev/ttyUSB0:115200", "serial:/dev/ttyUSB0:115200"),
+    ("serial:/dev/ttyACM0", "serial:/dev/ttyACM0:57600"),
+    ("/dev/ttyACM0", "serial:/dev/ttyACM0:57600"),
+    ("/dev/ttyACM0:921600", "serial:/dev/ttyACM0:921600"),
+    ("serial:/dev/serial/by-path/pci-0:1:1.0-port0:9600", "serial:/dev/serial/by-path/pci-0:1:1.0-port0:9600"),
 ]
 REFUSED = [
-    ("", "must read like udpin:0.0.0.0:14550 or udpout:127.0.0.1:14550"),
+    ("", "must read like udpin:0.0.0.0:14550, udpout:127.0.0.1:14550, tcp:127.0.0.1:5760, tcpin:0.0.0.0:5760 or"),
     ("14550", "must read like"),
     ("udpin:14550", "must read like"),
     ("udpin:0.0.0.0", "must read like"),
@@ -30,39 +39,22 @@ REFUSED = [
     ("udpin:0.0.0.0:14550\n", "must read like"),
     (" udpin:0.0.0.0:14550", "must read like"),
     ("udpin:0.0.0.0:14550:57600", "must read like"),
-    ("tcp:127.0.0.1:5760", "tcp is not a kind of link; allowed are udpin, udp (the same) and udpout"),
+    ("tcp:127.0.0.1", "must read like"),
+    ("tcp::5760", "tcp needs a host to speak to, as in tcp:127.0.0.1:5760"),
+    ("udpout::14550", "udpout needs a host to speak to, as in udpout:127.0.0.1:14550"),
+    ("tcpin:0.0.0.0:70000", "ports must be 1 to 65535"),
+    ("can:vcan0:1", "can is not a kind of link; allowed are udpin, udpout, tcp, tcpin, serial, udp (as udpin)"),
+    ("serial:ttyUSB0:57600", "a serial line must read like serial:/dev/ttyUSB0:57600"),
+    ("serial:/dev/ttyUSB0:", "a serial line must read like serial:/dev/ttyUSB0:57600"),
+    ("serial:/dev/ttyUSB0:0", "0 bits/s is no speed of a serial line; allowed are 1200 to 12000000"),
+    ("/dev/ttyUSB0:99999999", "99999999 bits/s is no speed of a serial line"),
+    ("/dev/ttyUSB0\n", "a serial line must read like"),
     ("UDPIN:0.0.0.0:14550", "UDPIN is not a kind of link"),
     ("udpin:0.0.0.0:0", "ports must be 1 to 65535"),
     ("udpin:0.0.0.0:65536", "ports must be 1 to 65535"),
     ("udpin:0.0.0.0:14555-14550", "the first of a range not above the last"),
     ("udpin:0.0.0.0:65530-65536", "ports must be 1 to 65535"),
 ]  # fmt: skip
-
-
-@pytest.fixture
-def opened():
-    """Opens ports, and closes them after the test."""
-    ports = []
-
-    def open_port(connection):
-        ports.append(UdpPort(connection))
-        return ports[-1]
-
-    yield open_port
-    for port in ports:
-        port.close()
-
-
-@pytest.fixture
-def free():
-    """A loopback port that nobody has."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-def here(kind, port):
-    return Connection(kind, "127.0.0.1", port)
 
 
 @pytest.mark.parametrize(("text", "canonical"), UNDERSTOOD)
@@ -90,34 +82,13 @@ def test_what_cannot_be_used_is_refused_with_what_was_said_and_what_is_allowed(t
     assert "\n" not in str(refused.value)
 
 
-def test_a_port_that_somebody_has_is_refused_in_one_sentence(opened, free):
-    opened(here("udpin", free))
-    with pytest.raises(ConnectionRefused, match=rf"^udpin:127\.0\.0\.1:{free}: Address already in use$"):
-        opened(here("udpin", free))
+def test_only_a_serial_line_has_a_speed():
+    assert parse("serial:/dev/ttyUSB0")[0].bits_per_s == 57600
+    assert parse("/dev/ttyUSB0:115200")[0].bits_per_s == 115200
+    assert [parse(f"{kind}:127.0.0.1:1")[0].bits_per_s for kind in ("udpin", "udpout", "tcp", "tcpin")] == [None] * 4
 
 
-def test_a_port_is_free_again_when_it_is_closed(opened, free):
-    opened(here("udpin", free)).close()
-    opened(here("udpin", free))
-
-
-def test_who_speaks_first_is_answered(opened, free):
-    listener, speaker = opened(here("udpin", free)), opened(here("udpout", free))
-    assert speaker.send(b"one")
-    assert speaker.send(b"two")
-    (first, address), (second, same) = listener.receive()
-    assert (first, second) == (b"one", b"two")
-    assert address == same
-    assert listener.send(b"answer", address)
-    assert [data for data, _ in speaker.receive()] == [b"answer"]
-
-
-def test_nothing_waiting_is_nothing_received(opened, free):
-    assert opened(here("udpin", free)).receive() == []
-
-
-def test_speaking_to_nobody_raises_nothing(opened, free):
-    speaker = opened(here("udpout", free))
-    for _ in range(5):
-        assert speaker.send(b"hello?") in (True, False)
-        assert speaker.receive() == []
+def test_a_range_is_understood_of_every_network_kind():
+    assert [str(one) for one in parse("tcp:10.0.0.1:5760-5762")] == [
+        f"tcp:10.0.0.1:{port}" for port in (5760, 5761, 5762)
+    ]
