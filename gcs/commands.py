@@ -27,16 +27,37 @@ class RequestMessage:
 
 
 @dataclass(frozen=True, slots=True)
+class RequestParameter:
+    """Tell the value of a parameter."""
+
+    name: str
+    """At most 16 characters."""
+
+
+@dataclass(frozen=True, slots=True)
 class Arm:
     """Start the rotors."""
 
 
 @dataclass(frozen=True, slots=True)
+class Kill:
+    """Stop the rotors at once, in the air too: the vehicle falls."""
+
+
+@dataclass(frozen=True, slots=True)
 class TakeOff:
-    """Climb straight up."""
+    """Climb straight up, as PX4 reads it."""
 
     altitude_m: float
     """Above mean sea level."""
+
+
+@dataclass(frozen=True, slots=True)
+class TakeOffAboveHome:
+    """Climb straight up, as ArduPilot reads the same message."""
+
+    height_m: float
+    """Above home."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,4 +84,16 @@ class SetVelocity(NamedTuple):
     """rad."""
 
 
-Command = Beat | RequestStream | RequestMessage | Arm | TakeOff | ChangeMode | Land | SetVelocity
+Command = (
+    Beat
+    | RequestStream
+    | RequestMessage
+    | RequestParameter
+    | Arm
+    | Kill
+    | TakeOff
+    | TakeOffAboveHome
+    | ChangeMode
+    | Land
+    | SetVelocity
+)

@@ -12,11 +12,14 @@ from gcs.commands import (
     Beat,
     ChangeMode,
     Command,
+    Kill,
     Land,
     RequestMessage,
+    RequestParameter,
     RequestStream,
     SetVelocity,
     TakeOff,
+    TakeOffAboveHome,
 )
 from wire.frames import Sender
 from wire.ids import AUTOPILOT
@@ -35,10 +38,19 @@ BATTERY_STATUS = dialect.MAVLINK_MSG_ID_BATTERY_STATUS
 EXTENDED_SYS_STATE = dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE
 STATUSTEXT = dialect.MAVLINK_MSG_ID_STATUSTEXT
 SIM_STATE = dialect.MAVLINK_MSG_ID_SIM_STATE
+COMMAND_ACK = dialect.MAVLINK_MSG_ID_COMMAND_ACK
+EKF_STATUS_REPORT = dialect.MAVLINK_MSG_ID_EKF_STATUS_REPORT
+GPS_RAW_INT = dialect.MAVLINK_MSG_ID_GPS_RAW_INT
+HOME_POSITION = dialect.MAVLINK_MSG_ID_HOME_POSITION
+PARAM_VALUE = dialect.MAVLINK_MSG_ID_PARAM_VALUE
 
 ARMED = dialect.MAV_MODE_FLAG_SAFETY_ARMED
 PREARM_CHECK = dialect.MAV_SYS_STATUS_PREARM_CHECK
 
+FORCE = 21196
+"""param2 of MAV_CMD_COMPONENT_ARM_DISARM: whatever the autopilot thinks of it."""
+BY_NAME = -1
+"""param_index of PARAM_REQUEST_READ: the name says which."""
 VELOCITY_WITH_YAW = 0x09C7
 """type_mask: velocity and yaw count, all else is to be ignored."""
 
@@ -69,11 +81,19 @@ class Encoder:
                 return self._long(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval_s * 1e6)
             case RequestMessage(message):
                 return self._long(dialect.MAV_CMD_REQUEST_MESSAGE, message)
+            case RequestParameter(name):
+                return self._sender.pack(
+                    dialect.MAVLink_param_request_read_message(self._system, AUTOPILOT, name.encode(), BY_NAME)
+                )
             case Arm():
                 return self._long(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1)
+            case Kill():
+                return self._long(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0, FORCE)
             case TakeOff(altitude_m):
                 nan = math.nan
                 return self._long(dialect.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, nan, nan, nan, altitude_m)
+            case TakeOffAboveHome(height_m):
+                return self._long(dialect.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, height_m)
             case ChangeMode(main, sub):
                 return self._long(dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, main, sub)
             case Land():
