@@ -15,7 +15,7 @@ from fdm.sensors import SAMPLE_S
 from fdm.shaping import SHAPING_S, Level, Motion
 from fdm.streams import NEVER, Schedule
 from fdm.surroundings import PERIOD_S, Surroundings
-from fdm.telemetry import Reporter
+from fdm.telemetry import MEASUREMENTS, Reporter
 from fdm.vehicle import FlightModelDiverged, Geodetic, Vector, Vehicle
 from wire.frames import Frame, Framer, decode
 from wire.ids import AUTOPILOT
@@ -30,9 +30,6 @@ VELOCITY_MASKS = frozenset({0x0DC7, 0x09C7, 0x05C7, 0x0FC7})
 """type_mask of a velocity set-point: alone, with yaw, with yaw rate, alone as MAVProxy writes it (force bit)."""
 IGNORE_YAW, IGNORE_YAW_RATE = 0x0400, 0x0800
 LOCAL_NED, BODY_NED = dialect.MAV_FRAME_LOCAL_NED, dialect.MAV_FRAME_BODY_NED
-
-MEASUREMENTS = (dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED, dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)
-"""Messages that report one measurement where they are due together."""
 
 FORCE_DISARM = 21196
 """param2 of MAV_CMD_COMPONENT_ARM_DISARM that disarms in the air."""
@@ -203,7 +200,8 @@ class Endpoint:
         if before.armed != self._pilot.armed:
             self.vehicle.arm() if self._pilot.armed else self.vehicle.disarm()
         for severity, text in outcome.words:
-            self._send(self._reporter.word(severity, text))
+            for frame in self._reporter.words(severity, text):
+                self._send(frame)
         return ACCEPTED if outcome.accepted else REJECTED
 
     def _fly(self, now: Situation, *, dt: float) -> None:
