@@ -14,12 +14,11 @@ import numpy.typing as npt
 
 from gcs.events import Rating
 from gcs.telemetry import Flags, Swarm
+from scenarios.fence import BELOW
 from trustr.roles import Roles
 
 Array = npt.NDArray[np.float64]
 
-BELOW = 3.0
-"""m under the others: where robots go that are left behind, within `roles.GONE_S`."""
 LOWER = 1.0
 """m: a robot this much lower than another may climb into it …"""
 ABOVE = 1.5

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from scenarios.faults import AnyFault, MotorDegradation
+from scenarios.fence import Fence, all_bounds, check_it_holds
 from scenarios.section import Fraction, Heading, Likert, NotNegative, Positive, Section
 
 
@@ -282,6 +283,8 @@ class Limits(Section):
 
     speed_m_s: Positive = 5.0
     acceleration_m_s2: Positive = 10.0
+    fence: Fence = Fence()
+    """Where it may take a vehicle."""
 
 
 class Expect(Section):
@@ -340,6 +343,7 @@ class Scenario(Section):
             raise ValueError(
                 f"mission.cruise_m_s = {self.mission.cruise_m_s} is above limits.speed_m_s = {self.limits.speed_m_s}"
             )
+        check_it_holds(self)
         return self
 
     def with_severity(self, max_speed_fraction: float) -> Scenario:
@@ -358,6 +362,10 @@ class Scenario(Section):
         if self.time.positions_per_tick is not None:
             return self
         return self._revised(time=self.time.model_dump() | {"positions_per_tick": positions_per_tick})
+
+    def fenced(self) -> Scenario:
+        """The same scenario; where it names no bound of its fence, one that holds its mission and a margin."""
+        return self._revised(limits=self.limits.model_dump() | {"fence": all_bounds(self)})
 
     def without_faults(self) -> Scenario:
         """The same scenario, everything healthy."""

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from gcs.events import Rating
-from gcs.leaving import ABOVE, BELOW, LOWER, lowered, settled, wanted_back
+from gcs.leaving import ABOVE, LOWER, lowered, settled, wanted_back
 from gcs.telemetry import Swarm
+from scenarios.fence import BELOW
 from trustr.roles import GONE_S, Roles
 
 NOBODY = (np.nan, np.nan)

@@ -70,7 +70,7 @@ network = {range_m = 30.0, best_range_m = 5.0, decay = 1.0}
 noise = {velocity_m_s = 0.2, position_m = 0.3, gust_m_s = 0.4, gust_time_s = 3.0}
 wind = {speed_m_s = 4.0, from_deg = 270.0, turbulence = 2.0, vehicles = [2, 3]}
 vehicle = {lag_s = 0.2, acceleration_m_s2 = 2.5, jerk_m_s3 = 5.0}
-limits = {speed_m_s = 4.0, acceleration_m_s2 = 3.0}
+limits = {speed_m_s = 4.0, acceleration_m_s2 = 3.0, fence = {radius_m = 60.0, ceiling_m = 20.0, floor_m = 1.5}}
 expect = {heading_error_deg = 5.0, distance_to_target_m = 4.0, min_separation_m = 0.5}
 
 [[fault]]
@@ -274,6 +274,11 @@ REFUSED = [
     ("noise.gust_m_s=-1", "noise.gust_m_s = -1", "greater than or equal to 0"),
     ("mission.cruise_m_s=fast", "mission.cruise_m_s = 'fast'", "number"),
     ("mission.cruise_m_s=9", "mission.cruise_m_s = 9", "limits.speed_m_s = 5"),
+    ("limits.fence.radius_m=30", "limits.fence.radius_m = 30", "goes 41.7 m", "3 m more", "must be 44.8 or more"),
+    ("limits.fence.ceiling_m=10", "limits.fence.ceiling_m = 10", "flies at 10 m", "must be 11 or more"),
+    ("limits.fence.floor_m=9.5", "limits.fence.floor_m = 9.5", "down to 10 m", "must be 9 or less"),
+    ("limits.fence.radius_m=0", "limits.fence.radius_m = 0", "greater than 0"),
+    ("limits.fence.radius=50", "limits.fence.radius = 50", "did you mean radius_m?", "ceiling_m, floor_m"),
     ("control.rule=best", "control", "rule = 'best'", "average, trust-r", "package.module:function"),
     ("vehicle.lag_s=-1", "vehicle.lag_s = -1", "greater than or equal to 0"),
     ("vehicle.jerk_m_s3=0", "vehicle.jerk_m_s3 = 0", "greater than 0"),
