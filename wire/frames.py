@@ -108,6 +108,11 @@ class Framer:
         return Frame(time_ns, system, component, message, data[at + header : stop], data[at : stop + tail])
 
 
+def sealed(body: bytes, message: int) -> bytes:
+    """The MAVLink 2 frame of a message of our dialect; body: its header, without the magic byte, and its payload."""
+    return b"\xfd" + body + _checksum(body + _CRC_EXTRA[message]).to_bytes(2, "little")
+
+
 def target_system(frame: Frame) -> int:
     """The system a frame is meant for; 0 is all of them."""
     at = _TARGET_AT.get(frame.message)
@@ -149,9 +154,8 @@ class Sender:
         body = _HEADER.pack(
             len(payload), 0, 0, self._sequence, self.system, self.component, message & 0xFFFF, message >> 16
         )
-        body += payload
         self._sequence = (self._sequence + 1) & 0xFF
-        return b"\xfd" + body + _checksum(body + _CRC_EXTRA[message]).to_bytes(2, "little")
+        return sealed(body + payload, message)
 
     def pack(self, message: Any) -> bytes:
         """A frame of a pymavlink message."""

@@ -1,0 +1,185 @@
+"""MAVLink 2 signing: who holds the key is believed, once, and in the order in which it spoke.
+
+A signature is the first 48 bits of SHA-256 over key, frame, link id and a timestamp of 10 µs since 2015. Nothing about
+a frame is believed, least of all its timestamp, before its digest is found right: a table that is touched earlier can
+be poisoned by anybody. Page: https://mavlink.io/en/guide/message_signing.html
+"""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import json
+import re
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from wire.frames import CRC, MAGIC_2, SIGNATURE, SIGNED, Frame, sealed
+
+EPOCH_S = 1_420_070_400
+"""2015-01-01T00:00Z, when signing timestamps begin, in seconds since 1970."""
+TICKS_PER_S = 100_000
+LAST_TICK = 2**48 - 1
+
+BEHIND_AT_MOST = 60 * TICKS_PER_S
+"""A stream that was never heard before may be this much older than the newest time known, and no more."""
+MARGIN = 2 * TICKS_PER_S
+"""What is written down is this much ahead, so that it holds for a while and need not be written for every frame."""
+STREAMS_AT_MOST = 1024
+"""Streams that are told apart; only who holds the key can open one."""
+
+KEY_FILE_AT_MOST = 4096
+
+Stream = tuple[int, int, int]
+"""System, component, link id."""
+
+
+class SigningKeyError(ValueError):
+    """A signing key, or a memory of signing, that cannot be used, in one sentence that does not show the key."""
+
+
+def read_key(path: Path) -> bytes:
+    """The 32 bytes of a key file: 64 hex digits, or a passphrase, which SHA-256 turns into a key.
+
+    MAVProxy and QGroundControl make the same key of the same passphrase. A newline at the end is not part of it. Raises
+    SigningKeyError.
+    """
+    try:
+        with path.open("rb") as file:
+            data = file.read(KEY_FILE_AT_MOST + 1)
+    except OSError as error:
+        raise SigningKeyError(f"signing key {path}: {error.strerror or error}") from None
+    try:
+        words = data.decode().rstrip("\r\n")
+    except UnicodeDecodeError:
+        raise SigningKeyError(f"signing key {path}: must be text, 64 hex digits or a passphrase") from None
+    if not words.strip() or len(data) > KEY_FILE_AT_MOST or "\n" in words:
+        raise SigningKeyError(f"signing key {path}: must hold one line, 64 hex digits or a passphrase")
+    if re.fullmatch(r"[0-9a-fA-F]{64}", words):
+        return bytes.fromhex(words)
+    if re.fullmatch(r"[0-9a-fA-F]{48,}", words):
+        raise SigningKeyError(f"signing key {path}: has {len(words)} hex digits; a key has 64")
+    return hashlib.sha256(words.encode()).digest()
+
+
+class Signer:
+    """Signs what leaves and judges what comes, for all streams of one program.
+
+    key:     32 bytes
+    memory:  a file of this program alone that keeps the newest timestamps, own and others', over a restart, even where
+             it was killed or its clock set back in between (after a kill, frames of the next 2 s are refused);
+             without one a frame can be played again after a restart, within a minute
+    link:    link id of what leaves, 0 to 255: two programs that sign as the same component must differ in it
+    wall:    seconds since 1970
+    """
+
+    def __init__(
+        self, key: bytes, *, memory: Path | None = None, link: int = 0, wall: Callable[[], float] = time.time
+    ) -> None:
+        if len(key) != 32:
+            raise SigningKeyError(f"a signing key has 32 bytes, this one {len(key)}")
+        self._keyed = hashlib.sha256(key)
+        self._link = link
+        self._wall = wall
+        self._memory = memory
+        self._recalled = {} if memory is None else _recalled(memory)
+        self._newest: dict[Stream, int] = dict(self._recalled)
+        self._last = max(self._newest.values(), default=0)
+        self._written: dict[Stream, int] = {}
+        """Up to where each stream is spent after a restart."""
+        self.trouble: str | None = None
+        """Why the memory could not be written last time, in one sentence."""
+        if memory is not None:
+            self._remember(memory, margin=0)
+            if self.trouble is not None:
+                raise SigningKeyError(self.trouble)
+
+    def sign(self, frame: bytes) -> bytes:
+        """An unsigned MAVLink 2 frame with its signature, and the checksum that goes with it."""
+        if frame[0] != MAGIC_2 or frame[2]:
+            raise ValueError("only a MAVLink 2 frame without flags can be signed")
+        message = int.from_bytes(frame[7:10], "little")
+        self._last = min(max(self._now(), self._last + 1), LAST_TICK)
+        stream = (frame[5], frame[6], self._link)
+        signed = sealed(frame[1:2] + bytes([SIGNED]) + frame[3:-CRC], message)
+        signed += bytes([self._link]) + self._last.to_bytes(6, "little")
+        self._note(stream, self._last)
+        return signed + self._digest(signed)
+
+    def refusal(self, frame: Frame) -> str | None:
+        """Why a frame is not to be believed, or None; one that is believed now is refused from now on."""
+        raw = frame.raw
+        if raw[0] != MAGIC_2:
+            return "version 1"
+        if not raw[2] & SIGNED:
+            return "unsigned"
+        if not hmac.compare_digest(self._digest(raw[:-6]), raw[-6:]):
+            return "bad signature"
+        stream = (frame.system, frame.component, raw[-SIGNATURE])
+        timestamp = int.from_bytes(raw[-12:-6], "little")
+        known = self._newest.get(stream)
+        if known is None:
+            if timestamp < max(self._now(), self._last) - BEHIND_AT_MOST:
+                return "replayed"
+            if len(self._newest) >= STREAMS_AT_MOST:
+                return "too many streams"
+        elif timestamp <= known:
+            return "replayed"
+        self._last = max(self._last, timestamp)
+        self._note(stream, timestamp)
+        return None
+
+    def save(self) -> None:
+        """Write down what is known now, to the tick: for an orderly end."""
+        if self._memory is not None:
+            self._remember(self._memory, margin=0)
+
+    def __repr__(self) -> str:
+        return f"Signer(link={self._link}, {len(self._newest)} streams)"
+
+    def _now(self) -> int:
+        return int((self._wall() - EPOCH_S) * TICKS_PER_S)
+
+    def _digest(self, data: bytes) -> bytes:
+        digest = self._keyed.copy()
+        digest.update(data)
+        return digest.digest()[:6]
+
+    def _note(self, stream: Stream, timestamp: int) -> None:
+        self._newest[stream] = timestamp
+        if self._memory is not None and timestamp > self._written.get(stream, -1):
+            self._remember(self._memory, margin=MARGIN)
+
+    def _remember(self, memory: Path, *, margin: int) -> None:
+        """Write the memory; where that fails, flying comes first: it is tried again when what it holds runs out."""
+        self._written = {
+            stream: newest if newest == self._recalled.get(stream) else min(newest + margin, LAST_TICK)
+            for stream, newest in self._newest.items()
+        }
+        draft = memory.with_name(memory.name + ".new")
+        try:
+            draft.write_text(json.dumps([[*stream, timestamp] for stream, timestamp in self._written.items()]))
+            draft.replace(memory)
+        except OSError as error:
+            self.trouble = f"signing memory {memory}: cannot be written: {error.strerror or error}"
+        else:
+            self.trouble = None
+
+
+def _recalled(memory: Path) -> dict[Stream, int]:
+    """What a memory holds. Raises SigningKeyError."""
+    try:
+        lines = json.loads(memory.read_bytes())
+        entries = {(int(system), int(component), int(link)): int(newest) for system, component, link, newest in lines}
+        if not all(0 <= newest <= LAST_TICK for newest in entries.values()):
+            raise ValueError
+    except FileNotFoundError:
+        return {}
+    except OSError as error:
+        raise SigningKeyError(f"signing memory {memory}: cannot be read: {error.strerror or error}") from None
+    except (ValueError, TypeError, OverflowError):
+        raise SigningKeyError(
+            f"signing memory {memory}: is damaged; a minute after the last flight it may be deleted, to begin a new one"
+        ) from None
+    return entries
