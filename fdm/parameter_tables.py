@@ -82,7 +82,7 @@ def px4(system: int) -> tuple[Entry, ...]:
         _real("MPC_LAND_SPEED", 0.7, 0.6, 3.0),  # m/s
         _real("MPC_TKO_SPEED", 1.5, 1.0, 5.0),  # m/s
         _real("MPC_XY_CRUISE", 5.0, 3.0, 12.0),  # m/s
-        _real("MPC_XY_P", 0.95, 0.0, 2.0),  # 1/s
+        _fixed("MPC_XY_P", 0.95, kind=REAL32),  # 1/s
         _real("MPC_XY_VEL_MAX", 12.0, 0.0, 12.0),  # m/s
         _real("MPC_Z_VEL_MAX_DN", 1.5, 0.5, 4.0),  # m/s
         _real("MPC_Z_VEL_MAX_UP", 3.0, 0.5, 8.0),  # m/s
