@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import re
 import struct
-from typing import Any, NamedTuple
+from collections import Counter
+from typing import Any, Literal, NamedTuple
 
 from fastcrc import crc16
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -17,6 +18,11 @@ MAGIC_1, MAGIC_2 = 0xFE, 0xFD
 HEADER_1, HEADER_2, CRC, SIGNATURE = 6, 10, 2, 13
 SIGNED = 0x01
 """The only incompatibility flag there is; a frame with any other must be dropped."""
+
+LONGEST = HEADER_2 + 255 + CRC + SIGNATURE
+"""Bytes of a frame, at most."""
+PATIENCE_NS = 1_000_000_000
+"""For the rest of a frame in a stream: the longest one takes 0.3 s at 9600 bits/s."""
 
 _HEADER = struct.Struct("<BBBBBBHB")
 _CRC_EXTRA = {number: bytes([kind.crc_extra]) for number, kind in dialect.mavlink_map.items()}
@@ -38,12 +44,8 @@ class Frame(NamedTuple):
     """The whole frame, for recording and for pymavlink."""
 
 
-class Framer:
-    """Cuts what one peer sends into frames.
-
-    Datagrams are cut one at a time with nothing kept between them: a header that claims more bytes than its datagram
-    has can otherwise swallow the genuine frames behind it. After a failure the search goes on at the next byte.
-    """
+class _Cutter:
+    """Finds frames in bytes, and counts what is none."""
 
     def __init__(self) -> None:
         self.bad_crc = 0
@@ -51,7 +53,7 @@ class Framer:
         self.unknown = 0
         """Headers with a message id or a flag that our dialect does not have."""
         self.truncated = 0
-        """Headers that claimed more bytes than the datagram had."""
+        """Headers that claimed more bytes than came."""
         self.garbage_bytes = 0
         """Bytes that belonged to no frame."""
 
@@ -60,21 +62,12 @@ class Framer:
         """Frames refused for any reason."""
         return self.bad_crc + self.unknown + self.truncated
 
-    def frames(self, time_ns: int, datagram: bytes) -> list[Frame]:
-        """All good frames of one datagram, in order."""
-        found = []
-        at, end = 0, len(datagram)
-        while at < end:
-            frame = self._frame_at(time_ns, datagram, at, end)
-            if frame is None:
-                self.garbage_bytes += 1
-                at += 1
-            else:
-                found.append(frame)
-                at += len(frame.raw)
-        return found
+    def rejections(self) -> Counter[str]:
+        """How many were refused for which reason."""
+        return Counter({"bad checksum": self.bad_crc, "unknown message": self.unknown, "cut short": self.truncated})
 
-    def _frame_at(self, time_ns: int, data: bytes, at: int, end: int) -> Frame | None:
+    def _frame_at(self, time_ns: int, data: bytes, at: int, end: int) -> Frame | Literal[False] | None:
+        """The frame that begins there; None where none does, False where bytes are missing that could make it one."""
         magic = data[at]
         if magic == MAGIC_2:
             header, tail = HEADER_2, CRC
@@ -83,8 +76,7 @@ class Framer:
         else:
             return None
         if end - at < header + tail:
-            self.truncated += 1
-            return None
+            return False
         if magic == MAGIC_2:
             length, incompatible, _, _, system, component, low, high = _HEADER.unpack_from(data, at + 1)
             message = low | high << 16
@@ -94,18 +86,85 @@ class Framer:
             tail += SIGNATURE * (incompatible & SIGNED)
         else:
             length, _, system, component, message = data[at + 1 : at + HEADER_1]
-        stop = at + header + length
-        if stop + tail > end:
-            self.truncated += 1
-            return None
         extra = _CRC_EXTRA.get(message)
         if extra is None:
             self.unknown += 1
             return None
+        stop = at + header + length
+        if stop + tail > end:
+            return False
         if _checksum(data[at + 1 : stop] + extra) != data[stop] | data[stop + 1] << 8:
             self.bad_crc += 1
             return None
         return Frame(time_ns, system, component, message, data[at + header : stop], data[at : stop + tail])
+
+
+class Framer(_Cutter):
+    """Cuts datagrams into frames.
+
+    They are cut one at a time with nothing kept between them: a header that claims more bytes than its datagram has can
+    otherwise swallow the genuine frames behind it. After a failure the search goes on at the next byte.
+    """
+
+    def frames(self, time_ns: int, datagram: bytes) -> list[Frame]:
+        """All good frames of one datagram, in order."""
+        found = []
+        at, end = 0, len(datagram)
+        while at < end:
+            frame = self._frame_at(time_ns, datagram, at, end)
+            if frame:
+                found.append(frame)
+                at += len(frame.raw)
+                continue
+            if frame is False:
+                self.truncated += 1
+            self.garbage_bytes += 1
+            at += 1
+        return found
+
+
+class StreamFramer(_Cutter):
+    """Cuts one peer's byte stream, which comes in pieces of any size, into frames.
+
+    What may yet become a frame is kept, less than LONGEST bytes of it. A header that claims too much delays the frames
+    behind it until as many bytes came, or PATIENCE_NS went by; then the search goes on at the byte behind its first, so
+    that none of them is lost.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._rest = b""
+        self._since_ns = 0
+        """When the first byte of the rest came, or later."""
+
+    def frames(self, time_ns: int, data: bytes) -> list[Frame]:
+        """All good frames that these bytes complete, in order."""
+        found = []
+        kept = len(self._rest)
+        late = time_ns - self._since_ns > PATIENCE_NS
+        data = self._rest + data
+        at, end = 0, len(data)
+        while at < end:
+            frame = self._frame_at(time_ns, data, at, end)
+            if frame:
+                found.append(frame)
+                at += len(frame.raw)
+                continue
+            if frame is False:
+                if not late or at >= kept:
+                    break
+                self.truncated += 1
+            self.garbage_bytes += 1
+            at += 1
+        self._rest = data[at:]
+        if at >= kept:
+            self._since_ns = time_ns
+        return found
+
+    @property
+    def waiting(self) -> int:
+        """Bytes kept that may yet become a frame."""
+        return len(self._rest)
 
 
 def sealed(body: bytes, message: int) -> bytes:
