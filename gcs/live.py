@@ -2,35 +2,40 @@
 
 from __future__ import annotations
 
-import selectors
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping
 
+from gcs.link_quality import LinkQuality, Meter
+from gcs.routes import Routes
 from wire.clock import WallClock
-from wire.connection import Address, Connection
-from wire.frames import Frame, Framer
+from wire.connection import Connection
+from wire.frames import Frame
+from wire.hub import Hub, Peer
 from wire.ids import AUTOPILOT
-from wire.ports import UdpPort
+from wire.signing import Signer
 
 
 class Live:
-    """The vehicles behind one or more UDP ports, told apart by system id."""
+    """The vehicles behind any mix of ports, told apart by system id, each bound to the address it speaks from."""
 
-    def __init__(self, connections: Iterable[Connection], ids: Sequence[int], *, speed: float = 1.0) -> None:
+    def __init__(
+        self,
+        connections: Iterable[Connection],
+        ids: Collection[int] | None,
+        *,
+        speed: float = 1.0,
+        signer: Signer | None = None,
+    ) -> None:
+        """ids: whom to hear, None hears anybody;  signer: with it, only what is signed is heard.
+
+        Raises ConnectionRefused.
+        """
         self._clock = WallClock(speed=speed)
-        self._ids = frozenset(ids)
-        self._framer = Framer()
+        self._hub = Hub(connections, signer=signer)
+        self._routes = Routes(ids)
+        self._meters: dict[int, Meter] = {}
         self._frames: list[Frame] = []
-        self._routes: dict[int, tuple[UdpPort, Address]] = {}
-        self._selector = selectors.DefaultSelector()
-        self._ports: list[UdpPort] = []
-        for connection in connections:
-            try:
-                port = UdpPort(connection)
-            except Exception:
-                self.close()
-                raise
-            self._ports.append(port)
-            self._selector.register(port, selectors.EVENT_READ)
+        self._refused: Counter[str] = Counter()
 
     def now(self) -> int:
         """ns since 1970."""
@@ -40,9 +45,9 @@ class Live:
         """Listen until then."""
         while True:
             seconds = self._clock.seconds_until(time_ns)
-            for key, _ in self._selector.select(seconds):
-                port: UdpPort = key.fileobj  # type: ignore[assignment]
-                self._listen(port)
+            self._hub.wait(seconds)
+            for peer, frame in self._hub.arrivals(self._clock.now):
+                self._take(peer, frame)
             if seconds == 0.0:
                 return
 
@@ -52,36 +57,51 @@ class Live:
         return frames
 
     def send(self, system: int, frame: bytes) -> None:
-        """To where the vehicle was last heard; before that, to every peer we are to speak to first."""
-        route = self._routes.get(system)
-        if route is not None:
-            route[0].send(frame, route[1])
-            return
-        for port in self._ports:
-            if port.connection.kind == "udpout":
-                port.send(frame)
+        """To where the vehicle speaks from; before it was heard, to every peer that waits for us to speak first."""
+        peer = self._routes.peer(system)
+        for receiver in self._hub.spoken_to_first if peer is None else (peer,):
+            self._hub.send(receiver, frame)
 
     @property
     def speaks_first(self) -> bool:
-        """Whether any link is to peers that wait for us."""
-        return any(port.connection.kind == "udpout" for port in self._ports)
+        """Whether any link is to peers that may wait for us."""
+        return bool(self._hub.spoken_to_first)
 
     def close(self) -> None:
         """Give the ports back."""
-        self._selector.close()
-        for port in self._ports:
-            port.close()
+        self._hub.close()
+
+    @property
+    def rejections(self) -> Mapping[str, int]:
+        """Reason → how many frames were refused for it."""
+        return self._hub.rejections + self._refused
 
     @property
     def rejected(self) -> int:
-        """Frames refused: wrong checksum, unknown message, cut short."""
-        return self._framer.rejected
+        """Frames refused for any reason."""
+        return sum(self.rejections.values())
 
-    def _listen(self, port: UdpPort) -> None:
-        now = self._clock.now()
-        for datagram, sender in port.receive():
-            for frame in self._framer.frames(now, datagram):
-                if frame.system in self._ids:
-                    self._frames.append(frame)
-                    if frame.component == AUTOPILOT:
-                        self._routes[frame.system] = port, sender
+    @property
+    def duplicates(self) -> frozenset[int]:
+        """System ids whose heartbeats come from two places that are both alive."""
+        return self._routes.duplicates(self.now())
+
+    @property
+    def quality(self) -> Mapping[int, LinkQuality]:
+        """System id → how well its autopilot is heard."""
+        return {system: meter.quality for system, meter in self._meters.items()}
+
+    def _take(self, peer: Peer, frame: Frame) -> None:
+        spoke = self._routes.peer(frame.system)
+        refusal = self._routes.refusal(frame, peer)
+        if refusal is not None:
+            self._refused[refusal] += 1
+            return
+        if spoke != peer:
+            self._meters[frame.system] = Meter()
+            self._hub.know(peer)
+            if spoke is not None and spoke not in self._routes.peers:
+                self._hub.forget(spoke)
+        if frame.component == AUTOPILOT:
+            self._meters[frame.system].count(frame)
+        self._frames.append(frame)

@@ -12,6 +12,7 @@ import pytest
 from flights import FDM, GCS, REPETITIONS, messages, recorded, start
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from gcs.link_quality import LinkQuality
 from gcs.live import Live
 from gcs.recording.reader import read
 from gcs.replay import decide_again
@@ -221,7 +222,7 @@ def test_frames_have_the_time_at_which_they_came_and_strangers_are_not_heard(lin
 
 
 @pytest.mark.wall_clock
-def test_what_is_sent_goes_to_where_the_vehicle_was_last_heard_and_before_that_nowhere(link):
+def test_what_is_sent_goes_to_where_the_vehicle_speaks_from_and_before_that_nowhere(link):
     live, port = link
     live.send(1, b"lost")
     with closing(Vehicles(port)) as one, closing(Vehicles(port)) as other:
@@ -230,13 +231,79 @@ def test_what_is_sent_goes_to_where_the_vehicle_was_last_heard_and_before_that_n
         after(live, 1.0)
         live.send(1, b"to one")
         live.send(2, b"to the other")
-        other.beat((1,))  # vehicle 1 has moved behind another port
-        after(live, 1.0)
+        other.beat((1,))  # claims to be vehicle 1, whose place is still alive
+        assert after(live, 1.0) == []
+        assert live.duplicates == {1}
+        assert live.rejections == {"wrong address": 1}
+        live.send(1, b"to one again")
+        after(live, 4.0)
+        assert live.duplicates == frozenset()
+        other.beat((1,))  # vehicle 1 has booted again behind another port
+        assert [frame.system for frame in after(live, 1.0)] == [1]
         live.send(1, b"to its new place")
         one.listen()
         other.listen()
-        assert [data for data, _ in one.received] == [b"to one"]
+        assert [data for data, _ in one.received] == [b"to one", b"to one again"]
         assert [data for data, _ in other.received] == [b"to the other", b"to its new place"]
+
+
+@pytest.mark.wall_clock
+def test_a_vehicle_is_heard_over_a_crowd_that_fills_the_port_it_is_known_on(link):
+    live, port = link
+    with closing(Vehicles(port)) as known, closing(Vehicles(port)) as unknown, closing(Vehicles(port)) as crowd:
+        known.beat((1,))
+        after(live, 1.0)
+        for _ in range(20_000):
+            crowd._socket.sendto(b"\xfdnobody can read this", (HOST, port))
+        known.beat((1,))
+        unknown.beat((2,))
+        assert [frame.system for frame in after(live, 1.0)] == [1]
+        assert live.rejections["wrong address"] == 0
+
+
+@pytest.mark.wall_clock
+def test_without_a_list_of_vehicles_everybody_is_heard_who_is_one():
+    port = free_port()
+    with closing(Live([Connection("udpin", HOST, port)], None, speed=100)) as live, closing(Vehicles(port)) as fleet:
+        fleet._senders.append(Sender(77, 1))
+        fleet.beat((1, 6, 7))
+        station = dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, 8, 0, 0, 4, 3)
+        fleet._socket.sendto(Sender(255, 190).pack(station), (HOST, port))
+        assert [frame.system for frame in after(live, 1.0)] == [1, 6, 77]
+        assert live.rejections == {"no heartbeat yet": 1}
+
+
+@pytest.mark.wall_clock
+def test_a_vehicle_not_heard_yet_is_spoken_to_only_where_we_are_to_speak_first():
+    listening, waiting = free_port(), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    waiting.bind((HOST, 0))
+    waiting.settimeout(1.0)
+    connections = [Connection("udpin", HOST, listening), Connection("udpout", HOST, waiting.getsockname()[1])]
+    with closing(waiting), closing(Live(connections, (1, 2), speed=100)) as live, closing(Vehicles(listening)) as fleet:
+        assert live.speaks_first
+        live.send(1, b"hello")
+        data, station = waiting.recvfrom(2048)
+        assert data == b"hello"
+        fleet.beat((2,))
+        waiting.sendto(Sender(1, 1).pack(dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3)), station)
+        assert sorted(frame.system for frame in after(live, 1.0)) == [1, 2]
+        live.send(2, b"to two")
+        live.send(1, b"to one")
+        assert waiting.recv(2048) == b"to one"
+        fleet.listen()
+        assert [data for data, _ in fleet.received] == [b"to two"]
+
+
+@pytest.mark.wall_clock
+def test_loss_is_counted_for_each_vehicle_by_the_numbers_of_its_autopilots_frames(link):
+    live, port = link
+    with closing(Vehicles(port)) as fleet:
+        for place in range(150):
+            fleet.beat((1, 2))
+            if 20 <= place < 25:  # five frames of vehicle 1 never leave
+                fleet._senders[0].pack(dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))
+        after(live, 1.0)
+    assert live.quality == {1: LinkQuality(received=150, lost=5), 2: LinkQuality(received=150)}
 
 
 @pytest.mark.wall_clock
