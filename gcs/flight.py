@@ -16,7 +16,7 @@ import numpy.typing as npt
 from gcs import leaving, losses, mission
 from gcs.autopilots import Fleet
 from gcs.beliefs import Beliefs, Seen
-from gcs.commands import Beat, Command, SetVelocity
+from gcs.commands import Beat, Command
 from gcs.control import settings
 from gcs.events import LAND, Event, Rating
 from gcs.flight_state import (
@@ -29,7 +29,7 @@ from gcs.flight_state import (
     entered,
     failed,
 )
-from gcs.gate import Limits, admit
+from gcs.gate import LOST_NS, Limits, Standing, admit
 from gcs.rules import RuleError
 from gcs.swarm_frame import swarm_frame
 from gcs.telemetry import Swarm
@@ -41,8 +41,8 @@ from trustr.roles import taken_back
 Array = npt.NDArray[np.float64]
 Commands = list[tuple[int, Command]]
 
-STALE_NS, LOST_NS = 300_000_000, 1_000_000_000
-"""Age of telemetry from which a vehicle has weight 0, and from which it gets no more set-points."""
+STALE_NS = 300_000_000
+"""Age of telemetry from which a vehicle has weight 0."""
 RETRY_S = 1.0
 """Between two askings for the same thing."""
 JOIN_S = 60.0
@@ -76,10 +76,11 @@ class Flight:
         self._settings = settings(scenario)
         self._offset_ne = offsets_ne(scenario)
         self._beliefs = Beliefs(scenario, self._settings, rated=ratings is not None)
+        self._ahead = self.plan.segments[0].velocity_ne / scenario.mission.cruise_m_s
         self._leader = mission.PROFILES[scenario.control.profile]
         position_s = scenario.time.period_s / (scenario.time.positions_per_tick or 1)
         self._fleet = Fleet(height_m=scenario.swarm.altitude_m, position_s=position_s)
-        self._limits = Limits(scenario.limits.speed_m_s, scenario.limits.acceleration_m_s2)
+        self._limits = Limits.of(scenario)
         self._period_s = scenario.time.period_s
         self._run_up_ticks = scenario.time.ticks(scenario.mission.run_up_s)
         self._phases: dict[Phase, Callable[[FlightState, Swarm, int], Step]] = {
@@ -191,7 +192,7 @@ class Flight:
         if streaming_s >= STREAM_FIRST_S:
             state, ask, _ = self._ask(state, swarm, lambda row: _some(self._fleet.next_to_obey(swarm, row)))
         state, commands, diagnosis = self._steer(
-            state, swarm, np.zeros((len(swarm.ids), 2)), self._overview(state, swarm)
+            state, now_ns, swarm, np.zeros((len(swarm.ids), 2)), self._overview(state, swarm)
         )
         return state, ask + commands, diagnosis
 
@@ -208,7 +209,7 @@ class Flight:
         diagnosis = self._overview(state, swarm)
         back = RUN_UP_GAIN * (place - diagnosis.position_ne)
         asked = speed * ahead + capped(np.where(np.isfinite(back), back, 0.0), RUN_UP_CAP)
-        return self._steer(state, swarm, asked, diagnosis)
+        return self._steer(state, now_ns, swarm, asked, diagnosis)
 
     def _mission(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
         time_s = self._mission_s(state)
@@ -227,12 +228,13 @@ class Flight:
         state = self._note_the_lost(replace(state, memory=memory), swarm, flying, now_ns)
         commanded = flying & swarm.fresh(now_ns, within_ns=LOST_NS)
         if self.scenario.trust.beyond_repair == "keep":
-            return self._steer(state, swarm, decision.velocity_ne, diagnosis, decision, commanded)
-        return self._leave_behind(state, swarm, diagnosis, decision, commanded)
+            return self._steer(state, now_ns, swarm, decision.velocity_ne, diagnosis, decision, commanded)
+        return self._leave_behind(state, now_ns, swarm, diagnosis, decision, commanded)
 
     def _leave_behind(
         self,
         state: FlightState,
+        now_ns: int,
         swarm: Swarm,
         diagnosis: Diagnosis,
         decision: Decision,
@@ -247,7 +249,7 @@ class Flight:
             commanded = commanded & ~roles.gone
         lower = leaving.lowered(roles, swarm, diagnosis.position_ne)
         state, steering, diagnosis = self._steer(
-            state, swarm, decision.velocity_ne, diagnosis, decision, commanded, lower=lower
+            state, now_ns, swarm, decision.velocity_ne, diagnosis, decision, commanded, lower=lower
         )
         return state, commands + steering, diagnosis
 
@@ -280,6 +282,7 @@ class Flight:
     def _steer(
         self,
         state: FlightState,
+        now_ns: int,
         swarm: Swarm,
         velocity_ne: Array,
         diagnosis: Diagnosis,
@@ -295,19 +298,29 @@ class Flight:
         asked[:, :2], asked[:, 2] = velocity_ne, down
         if decision is not None and decision.roles.gone.any():
             asked = leaving.settled(asked, decision.roles)
-        sent, verdict = admit(asked, state.sent_ned, self._limits, dt=self._period_s)
-        if commanded is None:
-            commanded = np.ones(len(swarm.ids), bool)
-        yaw = self._heading(diagnosis.virtual)
-        commands: Commands = [
-            (system, SetVelocity(north, east, climb, yaw))
-            for system, (north, east, climb), fly in zip(swarm.ids, sent.tolist(), commanded.tolist(), strict=True)
-            if fly
-        ]
-        diagnosis = replace(
-            diagnosis, decision=decision, asked_ned=asked, sent_ned=sent, verdict=verdict, commanded=commanded
+        ours = np.ones(len(swarm.ids), bool) if commanded is None else commanded
+        place = np.column_stack(
+            [diagnosis.position_ne + self._run_up_m(self._run_up_ticks) * self._ahead, swarm.position_ned[:, 2]]
         )
-        return replace(state, sent_ned=sent), commands, diagnosis
+        standing = Standing(
+            ids=swarm.ids,
+            ours=ours,
+            age_ns=now_ns - swarm.position_ns,
+            place_ned=place,
+            velocity_ned=swarm.velocity_ned,
+            before_ned=state.sent_ned,
+            lateness_ns=0,
+        )
+        passed = admit(asked, self._heading(diagnosis.virtual), standing, self._limits, dt=self._period_s)
+        diagnosis = replace(
+            diagnosis,
+            decision=decision,
+            asked_ned=asked,
+            sent_ned=passed.sent_ned,
+            verdict=passed.verdict,
+            commanded=passed.commanded,
+        )
+        return replace(state, sent_ned=passed.sent_ned), list(passed.commands), diagnosis
 
     def _note_the_lost(
         self, state: FlightState, swarm: Swarm, flying: npt.NDArray[np.bool_], now_ns: int
