@@ -1,9 +1,10 @@
-"""What people do while a flight goes on, as events of the loop: to end it, and to rate who flies it."""
+"""What people do while a flight goes on, as events of the loop: to end it, to command it, and to rate who flies it."""
 
 from __future__ import annotations
 
 import signal
 from collections.abc import Callable
+from contextlib import suppress
 from types import FrameType, TracebackType
 
 from gcs.events import LAND, Event, Rating
@@ -15,9 +16,16 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 class Operator:
     """Turns the first signal into the event LAND; the second ends the process at once, its recording closed."""
 
-    def __init__(self, say: Callable[[str], None], *, ratings: Callable[[], tuple[Rating, ...]] = tuple) -> None:
-        """ratings: hands out those that came since its last call; called once by each call of `events`."""
+    def __init__(
+        self,
+        say: Callable[[str], None],
+        *,
+        words: Callable[[], tuple[str, ...]] = tuple,
+        ratings: Callable[[], tuple[Rating, ...]] = tuple,
+    ) -> None:
+        """words, ratings: hand out what came since their last call; called once by each call of `events`."""
         self._say = say
+        self._words = words
         self._ratings = ratings
         self._waiting: list[str] = []
         self.interrupted = False
@@ -36,8 +44,9 @@ class Operator:
         """What came since the last call; what is to be said of it is said here, outside the signal."""
         asked, self._waiting = tuple(self._waiting), []
         if asked:
-            self._say("Landing the swarm. Ctrl-C once more ends at once and lands nothing.")
-        return *asked, *self._ratings()
+            with suppress(Exception):  # a terminal that has gone is why we land, not why we do not
+                self._say("Landing the swarm. Ctrl-C once more ends at once and lands nothing.")
+        return *asked, *self._words(), *self._ratings()
 
     def _on_signal(self, _signal: int, _frame: FrameType | None) -> None:
         if self.interrupted:

@@ -6,11 +6,14 @@ import datetime as dt
 import platform
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from importlib.metadata import version
 from itertools import count
 from pathlib import Path
 
+from gcs import console
+from gcs.emergency import LastResort
 from gcs.events import Rating
 from gcs.flight import Flight
 from gcs.flight_state import FlightState, left_behind
@@ -19,6 +22,7 @@ from gcs.operator import Operator
 from gcs.recording.reader import RECORDING
 from gcs.recording.writer import SUMMARY, Recorder, RecordingError, Tap
 from gcs.scoring import min_separation, score
+from gcs.shielded import Shielded
 from gcs.summary import Summary, collision, severity_of, trust_of
 from gcs.track import Track, Tracker
 from gcs.truth import Truth
@@ -39,12 +43,14 @@ def flown(
     operator: Operator,
     watching: Callable[[Flight], Iterable[Record]],
     ratings: Sequence[Rating] | None = None,
+    say: Callable[[str], None] = console.say,
 ) -> Summary:
     """Fly a scenario over a link; leaves run.mcap, summary.json and trajectory.png in `out`.
 
     name: how the summary calls the scenario;  watching: builds what shows the flight while it goes on;
     ratings: known beforehand, () where only live ones may come, None where nobody rates.
-    Raises RecordingError before take-off where `out` cannot be written.
+    A recording or a display that fails is said at once and in the summary; the flight goes on. Any other error lands
+    the fleet before it is raised. Raises RecordingError before take-off where `out` cannot be written.
     """
     flight = Flight(scenario, ratings=ratings)
     truth = Truth(flight.ids)
@@ -52,22 +58,34 @@ def flown(
     began = time.perf_counter()
     start_ns = clock.now()
     metadata = _metadata(name, seed, ratings)
-    with Recorder(out / RECORDING, scenario, truth, start_ns=start_ns, metadata=metadata) as recorder:
-        state = fly(
-            Tap(link, clock, recorder),
-            clock,
-            flight,
-            (truth, tracker, recorder, *watching(flight)),
-            period_ns=scenario.time.period_ns,
-            events=operator.events,
+    with ExitStack() as stack:
+        recorder = Recorder(out / RECORDING, scenario, truth, start_ns=start_ns, metadata=metadata, say=say)
+        last_resort = LastResort(link, clock, flight.ids, say)
+        records = (
+            ("the last resort", last_resort),
+            ("the truth", truth),
+            ("the track", tracker),
+            ("the recording", recorder),
+            *(("the display", display) for display in watching(flight)),
         )
+        shielded = [stack.enter_context(Shielded(record, name, say)) for name, record in records]
+        with last_resort:
+            state = fly(
+                Tap(link, clock, recorder),
+                clock,
+                flight,
+                shielded,
+                period_ns=scenario.time.period_ns,
+                events=operator.events,
+            )
         took_s = time.perf_counter() - began
         track = tracker.track
         recording = (out / RECORDING).resolve()
         summary = _summary(name, scenario, state, track, seed, took_s, recording, link.rejected)
         recorder.add_metadata(SUMMARY, {"json": summary.json().decode()})
-    if recorder.problem is not None:
-        summary = replace(summary, problem=summary.problem or recorder.problem, passed=False)
+    problem = summary.problem or recorder.problem or next(filter(None, (record.problem for record in shielded)), None)
+    if problem is not None:
+        summary = replace(summary, problem=problem, passed=False)
     _write_results(summary, track, scenario, out)
     return summary
 

@@ -12,10 +12,12 @@ import numpy as np
 import orjson
 from mcap.writer import CompressionType, Writer
 
+from gcs import console
 from gcs.beliefs import Belief
 from gcs.loop import Clock, Link, Tick
 from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
 from gcs.recording import topics
+from gcs.shielded import in_words
 from gcs.truth import Truth
 from scenarios import Fault, Scenario
 from trustr.roles import Roles
@@ -39,8 +41,17 @@ class Recorder:
     """One MCAP file: raw frames through a `Tap`, our topics tick by tick."""
 
     def __init__(
-        self, path: Path, scenario: Scenario, truth: Truth, *, start_ns: int, metadata: dict[str, str]
+        self,
+        path: Path,
+        scenario: Scenario,
+        truth: Truth,
+        *,
+        start_ns: int,
+        metadata: dict[str, str],
+        say: Callable[[str], None] = console.say,
     ) -> None:
+        """say: what to do with the one sentence about a recording that stops."""
+        self._say = say
         self.problem: str | None = None
         """Why the recording stopped, if it did: the flight goes on without it."""
         self._path = path
@@ -84,13 +95,24 @@ class Recorder:
         if self.problem is None:
             try:
                 write()
-            except OSError as error:
-                self.problem = f"{self._path}: the recording stopped: {error.strerror or error}"
+            except Exception as error:  # of the disk, or a defect of ours: vehicles are in the air either way
+                self._stopped(error)
+
+    def _stopped(self, error: Exception) -> None:
+        why = (error.strerror or error) if isinstance(error, OSError) else in_words(error)
+        self.problem = f"{self._path}: the recording stopped: {why}"
+        self._say(f"gcs: {self.problem}; the flight goes on without it")
 
     def raw(self, time_ns: int, system: int, component: int, frame: bytes) -> None:
         """A frame, under the name of its sender."""
         if self.problem is not None:
             return
+        try:
+            self._raw_frame(time_ns, system, component, frame)
+        except Exception as error:  # a chunk may be full at any frame, and the disk with it
+            self._stopped(error)
+
+    def _raw_frame(self, time_ns: int, system: int, component: int, frame: bytes) -> None:
         channel = self._raw.get((system, component))
         if channel is None:
             topic = f"/mavlink/{system}_{component}/raw"

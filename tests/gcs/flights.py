@@ -9,6 +9,7 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -127,6 +128,18 @@ def fly_and_record(
         name, scenario, link, world, seed=seed, out=folder, operator=operator, watching=watching, ratings=ratings
     )
     return Recorded(scenario, summary, folder, link)
+
+
+def failing(tick, error):
+    """What people say: nothing, and at one tick whoever listens to them fails."""
+    calls = count()
+
+    def events():
+        if next(calls) == tick:
+            raise error
+        return ()
+
+    return events
 
 
 def sent_by(known, *, world, seed=1, ratings=None):

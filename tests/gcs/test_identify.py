@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import orjson
 import pytest
-from flights import SHORT, fly_and_record, recorded, rewritten, scratch, told
+from flights import SHORT, failing, fly_and_record, recorded, rewritten, scratch, told
 
 from gcs.recording.reader import steered
 from scenarios import load
@@ -133,21 +133,10 @@ def test_a_file_that_is_no_recording_or_a_torn_one_is_refused(gcs, tmp_path):
         refused(gcs(tmp_path / "run.mcap"), "torn, damaged or not an MCAP file")
 
 
-class Ends:
-    """A record with a defect that shows so many seconds after the start."""
-
-    def __init__(self, after_s):
-        self._tick = after_s * 10
-
-    def tick(self, tick):
-        if tick.number == self._tick:
-            raise ZeroDivisionError
-
-
 def cut_short(after_s):
     folder = scratch()
     with pytest.raises(ZeroDivisionError):
-        fly_and_record("demo", out=folder, watching=lambda _flight: (Ends(after_s),))
+        fly_and_record("demo", out=folder, events=failing(after_s * 10 + 1, ZeroDivisionError()))
     return folder / "run.mcap"
 
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import orjson
 import pytest
-from flights import fly_and_record, messages, recorded, told
+from flights import failing, fly_and_record, messages, recorded, told
 from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader, SeekingReader
 from mcap.records import Chunk, Footer
@@ -261,17 +261,15 @@ def test_no_chunk_holds_back_more_than_a_tenth_of_a_second(flight):
 
 
 class Peek:
-    """A record that keeps what another process would find on the disk at one tick, or stops there as a defect would."""
+    """A record that keeps what another process would find on the disk at one tick."""
 
-    def __init__(self, path, tick, *, then=None):
-        self._path, self._tick, self._then = path, tick, then
+    def __init__(self, path, tick):
+        self._path, self._tick = path, tick
         self.on_disk = None
 
     def tick(self, tick):
         if tick.number == self._tick:
             self.on_disk = self._path.read_bytes()
-            if self._then is not None:
-                raise self._then
 
 
 def test_a_process_killed_at_any_time_leaves_all_but_the_last_tick_on_the_disk(tmp_path):
@@ -289,7 +287,7 @@ def test_a_process_killed_at_any_time_leaves_all_but_the_last_tick_on_the_disk(t
 def test_whatever_ends_a_flight_its_recording_is_whole(error, tmp_path):
     path = tmp_path / "run.mcap"
     with pytest.raises(type(error)):
-        fly_and_record("demo", out=tmp_path, watching=lambda _flight: (Peek(path, 30, then=error),))
+        fly_and_record("demo", out=tmp_path, events=failing(31, error))
     assert isinstance(records(path.read_bytes())[-1], Footer)
     assert read(path).track is None
     assert [content["number"] for content in contents(messages(path), "/tick")] == list(range(31))

@@ -5,7 +5,7 @@ from io import StringIO
 import numpy as np
 import orjson
 import pytest
-from flights import SHORT, fly_and_record, messages, recorded, rewritten
+from flights import SHORT, failing, fly_and_record, messages, recorded, rewritten
 from rich.console import Console
 
 from gcs.recording.reader import UnreadableRecording, ticks
@@ -99,17 +99,9 @@ def test_it_is_said_in_words_and_in_the_exit_code():
     assert "tick 140" in words
 
 
-class Defect:
-    """A record with a defect that shows at tick 200."""
-
-    def tick(self, tick):
-        if tick.number == 200:
-            raise ZeroDivisionError
-
-
 def test_a_flight_cut_short_is_decided_again_as_far_as_it_went(tmp_path):
     with pytest.raises(ZeroDivisionError):
-        fly_and_record("demo", out=tmp_path, watching=lambda _flight: (Defect(),))
+        fly_and_record("demo", out=tmp_path, events=failing(201, ZeroDivisionError()))
     result = decide_again(tmp_path / "run.mcap")
     assert result.difference is None
     assert result.ticks == 201

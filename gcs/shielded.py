@@ -1,0 +1,61 @@
+"""A record that may fail without taking the flight with it."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from types import TracebackType
+
+from gcs.loop import Record, Tick
+
+
+class Shielded:
+    """Hands ticks on until the record fails; then says so once, and leaves it out.
+
+    Whoever watches or writes down a flight is not part of it: vehicles are in the air whether or not a screen can be
+    drawn. Only the operator's second Ctrl-C passes.
+    """
+
+    def __init__(self, record: Record, name: str, say: Callable[[str], None]) -> None:
+        """name: how a person calls it, as in "the display"."""
+        self._record = record
+        self._name = name
+        self._say = say
+        self.problem: str | None = None
+        """Why it was left out, if it was."""
+
+    def __enter__(self) -> Shielded:
+        if isinstance(self._record, AbstractContextManager):
+            self._attempt(self._record.__enter__)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        record = self._record
+        if isinstance(record, AbstractContextManager):
+            self._attempt(lambda: record.__exit__(kind, error, trace))
+
+    def tick(self, tick: Tick) -> None:
+        """Hand it on."""
+        if self.problem is None:
+            self._attempt(lambda: self._record.tick(tick))
+
+    def _attempt(self, action: Callable[[], object]) -> None:
+        try:
+            action()
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # rich leaves by SystemExit where its terminal is gone
+            if self.problem is None:
+                self.problem = f"{self._name} failed and was left out: {in_words(error)}"
+                self._say(f"gcs: {self.problem}")
+
+
+def in_words(error: BaseException) -> str:
+    """An error that was caught, on one line: what, and at which line of whose file."""
+    frames = traceback.extract_tb(error.__traceback__)
+    where = f" ({frames[-1].filename.rsplit('/', 1)[-1]}, line {frames[-1].lineno})" if frames else ""
+    said = " ".join(str(error).split())
+    return f"{type(error).__name__}{': ' if said else ''}{said}{where}"
