@@ -1,11 +1,13 @@
 """One horizontal frame for vehicles that each have their own origin.
 
 The swarm's origin is where the first leg begins: the mean of the formation as it stands, moved ahead by the run-up.
-Height is each vehicle's own, above its home.
+Height is no part of it: that is each vehicle's own, above its home, because receivers differ by metres in altitude.
+`gcs.telemetry` counts it from home wherever the origin is.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +36,17 @@ class SwarmFrame:
         east_deg = (longitude_deg - self.longitude_deg + 180.0) % 360.0 - 180.0
         ne[:, 1] = east_deg * self.metres_per_degree[1] - self.origin_ne[1]
         return ne
+
+
+def origin_of(
+    latitude_deg: float, longitude_deg: float, altitude_m: float, position_ned: Sequence[float]
+) -> tuple[float, float, float]:
+    """Latitude, longitude [degrees] and altitude [m] of the origin from which a place is `position_ned` [m] away."""
+    north, east, down = position_ned
+    back: tuple[float, float, float] = pymap3d.ned2geodetic(
+        -north, -east, -down, latitude_deg, longitude_deg, altitude_m
+    )
+    return back
 
 
 def swarm_frame(origin: Array, position_ne: Array, offset_ne: Array, run_up_ne: Array) -> SwarmFrame:

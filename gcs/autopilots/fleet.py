@@ -6,11 +6,13 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from gcs.autopilots.protocol import Autopilot
+from gcs.autopilots.ardupilot import ArduCopter
+from gcs.autopilots.protocol import UNKNOWN, Autopilot
 from gcs.autopilots.px4 import Px4
-from gcs.commands import Command
+from gcs.commands import Command, RequestParameter
+from gcs.parameters import untold
 from gcs.telemetry import NEVER, Flags, Swarm
-from wire.modes import PX4
+from wire.modes import ARDUPILOT, PX4
 
 
 class Fleet:
@@ -18,19 +20,31 @@ class Fleet:
 
     def __init__(self, *, height_m: float, position_s: float) -> None:
         """height_m: above each vehicle's home;  position_s: how often each tells its position and velocity."""
-        self._kinds: Mapping[int, Autopilot] = {PX4: Px4(height_m=height_m, position_s=position_s)}
+        self._kinds: Mapping[int, Autopilot] = {
+            PX4: Px4(height_m=height_m, position_s=position_s),
+            ARDUPILOT: ArduCopter(height_m=height_m, position_s=position_s),
+        }
 
     def next_to_know(self, swarm: Swarm, row: int) -> tuple[Command, ...]:
         """Everything that must be known before arming and has not been told."""
         kind = self._kind(swarm, row)
-        return () if kind is None or self.known(swarm, row) else kind.streams()
+        if kind is None or self.known(swarm, row):
+            return ()
+        lacking = untold(int(swarm.autopilot[row]), swarm.parameters[row])
+        return (
+            *kind.streams(),
+            *kind.asked_once(swarm, row),
+            *(RequestParameter(name) for group in lacking for name in group),
+        )
 
     def known(self, swarm: Swarm, row: int) -> bool:
         """All that must be known before arming has been told, and the vehicle is ready to be armed."""
         kind = self._kind(swarm, row)
         if kind is None or not kind.ready(swarm)[row]:
             return False
-        return bool(np.isfinite(swarm.position_ned[row]).all() and np.isfinite(swarm.origin[row]).all())
+        places = (*swarm.position_ned[row], *swarm.origin[row], swarm.home_m[row])
+        accuracy_told = not np.isnan(swarm.accuracy_m[row])
+        return bool(np.isfinite(places).all() and accuracy_told and swarm.landed_state[row] != UNKNOWN)
 
     def next_to_fly(self, swarm: Swarm, row: int) -> Command | None:
         """Towards hovering at height; None where it is under way, or there."""

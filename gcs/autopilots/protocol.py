@@ -5,19 +5,27 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from gcs.commands import Command
+from gcs import messages
+from gcs.commands import Command, RequestMessage
 from gcs.telemetry import Flags, Swarm
 
 AT_HEIGHT = 0.3
 """m: off the height asked for."""
+ON_GROUND, TAKING_OFF = dialect.MAV_LANDED_STATE_ON_GROUND, dialect.MAV_LANDED_STATE_TAKEOFF
+UNKNOWN = dialect.MAV_LANDED_STATE_UNDEFINED
 
 
 class Autopilot(Protocol):
     """One kind of autopilot. Rows are those of the swarm; a vehicle of another kind is not asked about."""
 
     def streams(self) -> tuple[Command, ...]:
-        """What to ask of a vehicle when it is first heard: what it shall send, and how often."""
+        """What a vehicle shall send regularly, and how often."""
+        ...
+
+    def asked_once(self, swarm: Swarm, row: int) -> tuple[Command, ...]:
+        """Messages that tell what is not known of a vehicle and no stream brings."""
         ...
 
     def next_to_fly(self, swarm: Swarm, row: int) -> Command | None:
@@ -60,6 +68,25 @@ class Autopilot(Protocol):
 def in_modes(swarm: Swarm, *modes: int) -> Flags:
     """(N,) whose heartbeat shows one of these."""
     return np.asarray(np.isin(swarm.custom_mode, modes))
+
+
+def may_arm(swarm: Swarm, row: int) -> bool:
+    """Whether a vehicle stands on the ground with its rotors off."""
+    return bool(not swarm.armed[row] and swarm.landed_state[row] == ON_GROUND)
+
+
+def missing(swarm: Swarm, row: int) -> tuple[Command, ...]:
+    """What any autopilot is asked for once: places, and how well it knows them.
+
+    An origin that nobody told follows from GLOBAL_POSITION_INT. The accuracy is asked for anew as long as anything
+    else keeps the vehicle on the ground: receivers get better.
+    """
+    asked = [RequestMessage(messages.GPS_RAW_INT)]
+    if not np.isfinite(swarm.origin[row]).all():
+        asked += [RequestMessage(messages.GPS_GLOBAL_ORIGIN), RequestMessage(messages.GLOBAL_POSITION_INT)]
+    if not np.isfinite(swarm.home_m[row]):
+        asked.append(RequestMessage(messages.HOME_POSITION))
+    return tuple(asked)
 
 
 def at_height(swarm: Swarm, row: int, height_m: float) -> bool:

@@ -10,19 +10,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcs import messages
-from gcs.autopilots.protocol import at_height, in_modes
-from gcs.commands import Arm, ChangeMode, Command, Land, RequestMessage, RequestStream, TakeOff
+from gcs.autopilots.protocol import at_height, in_modes, may_arm, missing
+from gcs.commands import Arm, ChangeMode, Command, Land, RequestStream, TakeOff
 from gcs.telemetry import Flags, Swarm
 from wire.modes import PX4_MODES
 
 SLOW_S: tuple[tuple[int, float], ...] = (
     (messages.ATTITUDE, 1.0),
     (messages.SYS_STATUS, 1.0),
-    (messages.EXTENDED_SYS_STATE, -1e-6),
-    (messages.BATTERY_STATUS, -1e-6),
-    (messages.GLOBAL_POSITION_INT, -1e-6),
+    (messages.EXTENDED_SYS_STATE, 1.0),
 )
-"""Message id and interval of what is shown and recorded now and then; −1 µs turns off what nobody reads."""
+"""Message id and interval of what is shown and recorded now and then."""
+UNREAD = (messages.BATTERY_STATUS, messages.GLOBAL_POSITION_INT)
+"""Message ids of what PX4 streams unasked and nobody reads."""
+OFF_S = -1e-6
+"""An interval of −1 µs turns a stream off."""
 
 _TAKEOFF, _HOLD, _OFFBOARD, _LAND = (PX4_MODES[name] for name in ("takeoff", "hold", "offboard", "land"))
 
@@ -38,8 +40,12 @@ class Px4:
 
     def streams(self) -> tuple[Command, ...]:
         """PX4 streams much by itself: some of it is turned off."""
-        streams = ((messages.LOCAL_POSITION_NED, self.position_s), *SLOW_S)
-        return (*(RequestStream(*stream) for stream in streams), RequestMessage(messages.GPS_GLOBAL_ORIGIN))
+        wanted = ((messages.LOCAL_POSITION_NED, self.position_s), *SLOW_S, *((message, OFF_S) for message in UNREAD))
+        return tuple(RequestStream(*stream) for stream in wanted)
+
+    def asked_once(self, swarm: Swarm, row: int) -> tuple[Command, ...]:
+        """Nothing but what is asked of all."""
+        return missing(swarm, row)
 
     def ready(self, swarm: Swarm) -> Flags:
         """(N,) SYS_STATUS says that the checks before arming pass."""
@@ -48,10 +54,10 @@ class Px4:
     def next_to_fly(self, swarm: Swarm, row: int) -> Command | None:
         """Towards hovering at height."""
         if not swarm.armed[row]:
-            return Arm()
+            return Arm() if may_arm(swarm, row) else None
         taking_off = swarm.custom_mode[row] == _TAKEOFF.custom_mode
         if not taking_off and not at_height(swarm, row, self.height_m):
-            return TakeOff(float(swarm.origin[row, 2]) + self.height_m)
+            return TakeOff(float(swarm.home_m[row]) + self.height_m)
         return None
 
     def hovering(self, swarm: Swarm, row: int) -> bool:
@@ -73,8 +79,8 @@ class Px4:
         return None if holding or not swarm.armed[row] else ChangeMode(_HOLD.main, _HOLD.sub)
 
     def obeying(self, swarm: Swarm) -> Flags:
-        """(N,) in OFFBOARD."""
-        return np.asarray(swarm.custom_mode == _OFFBOARD.custom_mode)
+        """(N,) in OFFBOARD, rotors running."""
+        return np.asarray(swarm.armed & (swarm.custom_mode == _OFFBOARD.custom_mode))
 
     def ours(self, swarm: Swarm) -> Flags:
         """(N,) in take-off, hold, OFFBOARD or land."""

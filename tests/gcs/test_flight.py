@@ -37,7 +37,10 @@ class Fleet:
             ready=np.ones(n, bool),
             autopilot=np.full(n, 12),
             custom_mode=np.full(n, MODE["hold"]),
+            landed_state=np.ones(n, int),
             battery=np.full(n, 0.9),
+            home_m=np.full(n, 320.0),
+            accuracy_m=np.full(n, 0.3),
         )
 
     def heard(self, tick, now_ns):

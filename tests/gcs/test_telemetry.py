@@ -1,17 +1,21 @@
 """What is known of the fleet: a fold of frames."""
 
-from dataclasses import fields
+from copy import deepcopy
+from dataclasses import fields, replace
 from math import inf, nan
 
 import numpy as np
+import pymap3d
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from gcs.telemetry import REBOOTED_MS, Swarm, observe
+from wire import parameters
 from wire.frames import Framer, Sender
 from wire.ids import AUTOPILOT, TRUTH
+from wire.modes import ARDUPILOT, PX4
 from wire.payloads import LOCAL_POSITION_NED, LocalPosition, pack_local_position
 
 NOW = 1_577_836_800_000_000_000
@@ -52,7 +56,24 @@ def messages():
         said(dialect.MAVLink_gps_global_origin_message(411512000, -814161000, 320500)),
         said(dialect.MAVLink_attitude_message(1000, 0.1, -0.2, 0.3, 0, 0, 0)),
         said(dialect.MAVLink_statustext_message(6, b"hello")),
+        said(dialect.MAVLink_home_position_message(0, 0, 318500, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0)),
+        said(gps(h_acc=1400)),
+        said(dialect.MAVLink_ekf_status_report_message(0x33F, 0, 0, 0, 0, 0)),
+        said(dialect.MAVLink_command_ack_message(400, 4, target_system=255, target_component=190)),
     ]
+
+
+def gps(*, h_acc, fix=3):
+    """GPS_RAW_INT that claims this accuracy [mm]."""
+    return dialect.MAVLink_gps_raw_int_message(0, fix, 0, 0, 0, 0, 0, 0, 0, 9, h_acc=h_acc)
+
+
+def parameter(name, value, kind=9):
+    return dialect.MAVLink_param_value_message(name.encode(), value, kind, 900, 17)
+
+
+def beat(autopilot):
+    return said(dialect.MAVLink_heartbeat_message(2, autopilot, 1, 0, 3, 3))
 
 
 def test_of_a_fleet_never_heard_nothing_is_known():
@@ -64,7 +85,7 @@ def test_of_a_fleet_never_heard_nothing_is_known():
 
 def test_every_message_tells_its_vehicle_and_nobody_else():
     swarm = observe(FLEET, messages())
-    assert swarm.position_ned[1].tolist() == [1, 2, -10]
+    assert swarm.position_ned[1].tolist() == [1, 2, -12]  # home is 2 m lower than the origin
     assert swarm.velocity_ned[1].tolist() == [0.5, 0.25, 0]
     assert swarm.boot_ms[1] == 1000
     assert swarm.position_ns[1] == swarm.heartbeat_ns[1] == NOW
@@ -74,6 +95,9 @@ def test_every_message_tells_its_vehicle_and_nobody_else():
     assert swarm.attitude_rpy[1] == pytest.approx([0.1, -0.2, 0.3])
     assert (swarm.armed[1], swarm.ready[1]) == (True, True)
     assert swarm.words == ((2, 6, "hello"),)
+    assert (swarm.home_m[1], swarm.home_down[1], swarm.accuracy_m[1]) == (318.5, 2.0, 1.4)
+    assert (swarm.landed_state[1], swarm.estimator[1]) == (2, 0x33F)
+    assert [answer.words for answer in swarm.answers] == ["vehicle 2: arming or disarming failed"]
     others = [0, 2]
     for field in fields(Swarm):
         before, after = getattr(FLEET, field.name), getattr(swarm, field.name)
@@ -81,19 +105,18 @@ def test_every_message_tells_its_vehicle_and_nobody_else():
             assert np.array_equal(before[others], after[others], equal_nan=before.dtype.kind == "f")
 
 
-def test_no_frames_change_nothing_but_the_words():
+def test_no_frames_change_nothing_but_words_and_answers():
     told = observe(FLEET, messages())
     silent = observe(told, [])
-    assert silent.words == ()
+    assert (silent.words, silent.answers) == ((), ())
     assert same(observe(silent, []), silent)
 
 
 def test_a_swarm_that_went_in_comes_out_of_nothing_changed():
     before = observe(FLEET, [position(boot_ms=500)])
-    copies = {field.name: np.copy(getattr(before, field.name)) for field in fields(Swarm)}
+    copies = deepcopy(before)
     observe(before, messages())
-    for name, copy in copies.items():
-        assert np.array_equal(getattr(before, name), copy, equal_nan=copy.dtype.kind == "f")
+    assert same(before, copies)
 
 
 @pytest.mark.parametrize("component", [TRUTH, 0, 100, 191])
@@ -140,17 +163,11 @@ def test_in_whatever_order_positions_arrive_the_newest_stands(order):
     assert observe(FLEET, arriving).position_ned[1, 0] == 7
 
 
-@given(st.permutations(range(7)), st.integers(0, 7))
+@given(st.permutations(range(len(messages()))), st.integers(0, len(messages())))
 def test_frames_may_come_in_one_tick_or_in_two(order, split):
     heard = [messages()[k] for k in order]
     at_once, in_two = observe(FLEET, heard), observe(observe(FLEET, heard[:split]), heard[split:])
-    for field in fields(Swarm):
-        if field.name != "words":
-            assert np.array_equal(
-                getattr(at_once, field.name),
-                getattr(in_two, field.name),
-                equal_nan=field.name in ("position_ned", "velocity_ned", "origin", "attitude_rpy", "battery"),
-            )
+    assert same(replace(at_once, words=(), answers=()), replace(in_two, words=(), answers=()))
 
 
 # --- what is no number
@@ -200,3 +217,157 @@ def test_positions_are_fresh_up_to_an_age(age_ns, fresh):
 def test_a_position_that_was_dropped_makes_nobody_fresher():
     swarm = observe(FLEET, [position(boot_ms=5000), position(boot_ms=4990, time_ns=NOW + 10**9)])
     assert swarm.position_ns[1] == NOW
+
+
+# --- height
+
+
+def home(altitude_mm):
+    return said(dialect.MAVLink_home_position_message(0, 0, altitude_mm, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0))
+
+
+def origin(altitude_mm):
+    return said(dialect.MAVLink_gps_global_origin_message(0, 0, altitude_mm))
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)])
+def test_height_counts_from_home_wherever_the_origin_is_and_whatever_is_told_first(order):
+    heard = [position(place=(1.0, 2.0, -10.0)), origin(320_000), home(325_000)]
+    one_by_one = FLEET
+    for k in order:
+        one_by_one = observe(one_by_one, [heard[k]])
+    assert one_by_one.position_ned[1].tolist() == [1, 2, -5]
+
+
+def test_home_moved_at_arming_moves_the_height_with_it():
+    known = observe(FLEET, [position(place=(1.0, 2.0, -10.0)), origin(320_000), home(320_000)])
+    assert known.position_ned[1, 2] == -10
+    assert observe(known, [home(319_000)]).position_ned[1, 2] == -11
+
+
+# --- an origin that nobody tells
+
+
+def place(latitude, longitude, altitude, boot_ms):
+    scaled = round(latitude * 1e7), round(longitude * 1e7), round(altitude * 1e3)
+    return said(dialect.MAVLink_global_position_int_message(boot_ms, *scaled, 0, 0, 0, 0, 0))
+
+
+@pytest.mark.parametrize("late_ms", [-250, 0, 100, 250])
+def test_an_origin_that_is_not_told_follows_from_two_reports_of_one_moment(late_ms):
+    north, east, down = -40.0, 30.0, -10.0
+    moved = late_ms / 1e3 * np.array([2.0, -1.0, 0.0])
+    there = pymap3d.ned2geodetic(*(moved + np.array([north, east, down])), 41.1512, -81.4161, 320.5)
+    at = position(boot_ms=5000, place=(north, east, down), velocity=(2.0, -1.0, 0.0))
+    swarm = observe(FLEET, [at, place(*there, 5000 + late_ms)])
+    back = pymap3d.geodetic2ned(*swarm.origin[1], 41.1512, -81.4161, 320.5)
+    assert back == pytest.approx((0, 0, 0), abs=0.02)  # 1e-7 degrees are 1 cm
+
+
+@pytest.mark.parametrize("late_ms", [-251, 251, 10_000])
+def test_reports_of_different_moments_tell_nothing_of_the_origin(late_ms):
+    swarm = observe(FLEET, [position(boot_ms=20_000), place(41.0, -81.0, 320.0, 20_000 + late_ms)])
+    assert np.isnan(swarm.origin).all()
+
+
+def test_nor_does_a_place_alone():
+    assert np.isnan(observe(FLEET, [place(41.0, -81.0, 320.0, 1000)]).origin).all()
+
+
+def test_an_origin_that_is_told_stands():
+    told, derived = origin(320_500), place(41.0, -81.0, 300.0, 1000)
+    for heard in ([position(), told, derived], [position(), derived, told]):
+        assert observe(FLEET, heard).origin[1].tolist() == [0, 0, 320.5]
+
+
+# --- accuracy
+
+
+@pytest.mark.parametrize(("h_acc", "fix", "accuracy_m"), [(900, 3, 0.9), (12, 6, 0.012), (0, 3, inf), (900, 2, inf)])
+def test_accuracy_is_what_a_receiver_with_a_fix_claims_and_infinite_where_it_claims_none(h_acc, fix, accuracy_m):
+    assert observe(FLEET, [said(gps(h_acc=h_acc, fix=fix))]).accuracy_m[1] == pytest.approx(accuracy_m)
+
+
+# --- parameters
+
+
+@pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT])
+@pytest.mark.parametrize(("kind", "value"), [(9, 0.5), (9, 3.0), (6, 4), (2, 5), (4, 255), (6, -1)])
+def test_a_parameter_is_read_as_its_autopilot_writes_it(autopilot, kind, value):
+    name = {PX4: "NAV_DLL_ACT", ARDUPILOT: "FS_GCS_ENABLE"}[autopilot]
+    told = said(parameter(name, parameters.encode(value, kind, autopilot), kind))
+    swarm = observe(FLEET, [beat(autopilot), told])
+    assert swarm.parameters == ({}, {name: value}, {})
+
+
+def test_parameters_add_up_and_the_newest_value_stands():
+    first = observe(FLEET, [beat(ARDUPILOT), said(parameter("GUID_TIMEOUT", 3.0))])
+    later = observe(first, [said(parameter("FS_GCS_TIMEOUT", 5.0)), said(parameter("GUID_TIMEOUT", 0.5))])
+    assert first.parameters[1] == {"GUID_TIMEOUT": 3.0}
+    assert later.parameters[1] == {"GUID_TIMEOUT": 0.5, "FS_GCS_TIMEOUT": 5.0}
+
+
+@pytest.mark.parametrize(
+    "heard",
+    [
+        [beat(ARDUPILOT), said(parameter("RTL_ALT", 1500.0))],
+        [beat(PX4), said(parameter("GUID_TIMEOUT", 3.0))],
+        [said(parameter("GUID_TIMEOUT", 3.0))],
+        [beat(ARDUPILOT), said(parameter("GUID_TIMEOUT", nan))],
+        [beat(ARDUPILOT), said(parameter("GUID_TIMEOUT", inf))],
+    ],
+    ids=["nobody asked", "another autopilot's", "before the first heartbeat", "no number", "infinite"],
+)
+def test_parameters_on_which_no_flight_depends_are_not_kept(heard):
+    assert observe(FLEET, heard).parameters == ({}, {}, {})
+
+
+# --- answers and words
+
+
+@pytest.mark.parametrize(("system", "component"), [(254, 190), (255, 1), (1, 0)])
+def test_answers_to_somebody_else_are_not_ours(system, component):
+    ack = dialect.MAVLink_command_ack_message(400, 0, target_system=system, target_component=component)
+    assert observe(FLEET, [said(ack)]).answers == ()
+
+
+@pytest.mark.parametrize(("result", "accepted"), [(0, True), (5, True), (1, False), (2, False), (3, False), (4, False)])
+def test_an_answer_says_who_took_what_and_how(result, accepted):
+    (answer,) = observe(FLEET, [said(dialect.MAVLink_command_ack_message(22, result))]).answers
+    assert (answer.system, answer.command, answer.result) == (2, 22, result)
+    assert answer.accepted is accepted
+    assert answer.words.startswith("vehicle 2: taking off ")
+
+
+def chunks(text, *, text_id=7, severity=4):
+    pieces = [text[at : at + 50] for at in range(0, len(text) + 1, 50)]
+    return [
+        said(dialect.MAVLink_statustext_message(severity, piece.encode(), id=text_id, chunk_seq=k))
+        for k, piece in enumerate(pieces)
+    ]
+
+
+@pytest.mark.parametrize("length", [0, 1, 49, 50, 51, 99, 100, 101, 250])
+@pytest.mark.parametrize("split", [0, 1, 2])
+def test_a_text_in_pieces_is_told_when_it_is_complete(length, split):
+    text = ("PreArm: needs a better fix. " * 20)[:length]
+    heard = chunks(text)
+    begun = observe(FLEET, heard[:split])
+    done = observe(begun, heard[split:])
+    assert begun.words + done.words == ((2, 4, text),)
+    assert done.pieces == (None, None, None)
+
+
+def test_where_a_piece_was_lost_the_text_says_so():
+    first, _, last = chunks("a" * 50 + "b" * 50 + "c")
+    assert observe(FLEET, [first, last]).words == ((2, 4, "a" * 50 + "…"), (2, 4, "…c"))
+
+
+def test_a_text_that_never_ends_is_told_in_the_end():
+    swarm = FLEET
+    told = []
+    for seq in range(100):
+        swarm = observe(swarm, [said(dialect.MAVLink_statustext_message(4, b"x" * 50, id=9, chunk_seq=seq))])
+        told += swarm.words
+    assert told
+    assert max(len(text) for _, _, text in told) <= 401
