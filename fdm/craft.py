@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from fdm.modes import READY_AFTER, Pilot, Situation
+from fdm.modes import Pilot, Situation
 from fdm.personality import Personality
 from fdm.vehicle import Geodetic, Vehicle
 from scenarios.models import Noise
@@ -29,6 +29,10 @@ class Craft:
     noise: Noise = field(default_factory=Noise)
     """Of its measurements: what it may honestly claim."""
 
+    def is_ready(self, now: Situation) -> bool:
+        """Whether its sensors have settled."""
+        return now.time_s >= self.personality.machine.READY_AFTER
+
 
 class Moment(NamedTuple):
     """What it does now."""
@@ -47,11 +51,6 @@ class Moment(NamedTuple):
     def boot_us(self) -> int:
         """Its own clock, finer."""
         return round(self.now.time_s * 1e6)
-
-    @property
-    def is_ready(self) -> bool:
-        """Whether its sensors have settled."""
-        return self.now.time_s >= READY_AFTER
 
 
 Report = Callable[[Craft, Moment], Any]

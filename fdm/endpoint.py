@@ -3,45 +3,44 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
-from typing import Any, Final
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from fdm import modes
-from fdm.modes import Failsafe, Mode, Outcome, Pilot, Setpoint, Situation
+from fdm.answers import Answers
+from fdm.commands import MESSAGES as COMMANDS
+from fdm.commands import obey, request
+from fdm.modes import ON_TIME, Outcome, Pilot, Result, Severity, Situation, heading
+from fdm.parameter_service import LISTING
+from fdm.parameters import Parameters, table
 from fdm.personality import PX4, Personality
+from fdm.rules import Rules, rules
 from fdm.sensors import SAMPLE_S
+from fdm.setpoints import Inlet
 from fdm.shaping import SHAPING_S, Level, Motion
 from fdm.streams import NEVER, Schedule
 from fdm.surroundings import PERIOD_S, Surroundings
 from fdm.telemetry import MEASUREMENTS, Reporter
 from fdm.vehicle import FlightModelDiverged, Geodetic, Vector, Vehicle
-from wire.frames import Frame, Framer, decode
+from scenarios.models import Noise
+from wire.frames import Frame, Framer
 from wire.ids import AUTOPILOT
-from wire.payloads import SET_POSITION_TARGET_LOCAL_NED, PositionTarget, unpack_position_target
+from wire.payloads import SET_POSITION_TARGET_LOCAL_NED, unpack_position_target
 
 SAMPLING, SHAPING, GUIDANCE, WATCHDOG, TRUTH = -5, -4, -3, -2, -1
 """Keys of the schedule that are no message ids, in the order in which they are served: noting what stale telemetry
-will tell, taking up a velocity slowly, flying, the end of patience with silent set-points, the truth."""
+will tell, taking up a velocity slowly, flying, the end of patience with silent links, the truth."""
 TRUTH_PERIOD_S = 0.1
 
-VELOCITY_MASKS = frozenset({0x0DC7, 0x09C7, 0x05C7, 0x0FC7})
-"""type_mask of a velocity set-point: alone, with yaw, with yaw rate, alone as MAVProxy writes it (force bit)."""
-IGNORE_YAW, IGNORE_YAW_RATE = 0x0400, 0x0800
-LOCAL_NED, BODY_NED = dialect.MAV_FRAME_LOCAL_NED, dialect.MAV_FRAME_BODY_NED
-
-FORCE_DISARM = 21196
-"""param2 of MAV_CMD_COMPONENT_ARM_DISARM that disarms in the air."""
 SKIPS = 0.05
 """m above the ground, where legs that bounce or scrape count as standing: contacts come and go at low step rates."""
 STANDS_STILL = 1e-9
 """m/s: a horizontal set-point above it asks the vehicle to move."""
 
-ACCEPTED: Final[int] = dialect.MAV_RESULT_ACCEPTED
-REJECTED: Final[int] = dialect.MAV_RESULT_TEMPORARILY_REJECTED
-DENIED: Final[int] = dialect.MAV_RESULT_DENIED
-UNSUPPORTED: Final[int] = dialect.MAV_RESULT_UNSUPPORTED
+
+TYPE_AT = 4
+"""Where MAV_TYPE is in the payload of a HEARTBEAT."""
 
 
 class Endpoint:
@@ -53,30 +52,45 @@ class Endpoint:
         surroundings: Surroundings,
         *,
         system: int,
-        origin: Geodetic,
+        home: Geodetic,
         physics_hz: int,
         personality: Personality = PX4,
-        failsafe: Failsafe = Failsafe(),  # noqa: B008 - frozen
+        parameters: Parameters | None = None,
+        origin_ne: Level = (0.0, 0.0),
+        noise: Noise | None = None,
         shape: Callable[[Motion, Level], Motion] | None = None,
     ) -> None:
+        """home: the pad;  parameters: ours unless told;  origin_ne: m from the pad to where its positions count from.
+
+        noise: of its measurements, for the accuracy that it claims
+        """
         self.vehicle = vehicle
         self.system = system
+        self.personality = personality
+        self.parameters = parameters or table(personality.name, system=system)
         self.framer = Framer()
-        self.refused_setpoints = 0
-        """Set-points that named a frame or a mask we do not fly, or a number that is none."""
         self.lost = False
         """The flight model diverged: from now on the vehicle is silent, and the others fly on."""
         self.first_motion_step: int | None = None
         """Step at which the vehicle was first asked to move sideways from outside."""
         self._surroundings = surroundings
-        self._personality = personality
-        self._failsafe = failsafe
+        self._machine = personality.machine
+        self._rules = rules(self.parameters)
+        self._inlet = Inlet(personality.frames)
         self._shape = shape
         self._motion: Motion | None = None
         """What is asked of the flight controller, where set-points are shaped and flown."""
         self._wanted_ned = (0.0, 0.0, 0.0)
         self._hz = physics_hz
-        self._reporter = Reporter(vehicle, system=system, origin=origin, personality=personality)
+        self._home = home
+        self._reporter = Reporter(
+            vehicle,
+            system=system,
+            origin=home,
+            personality=personality,
+            origin_ne=origin_ne,
+            noise=noise,
+        )
         self._outbox: list[tuple[int, bytes]] = []
         self._schedule = Schedule(physics_hz)
         self._schedule.set_interval(GUIDANCE, PERIOD_S, step=0)
@@ -87,25 +101,29 @@ class Endpoint:
             self._schedule.set_interval(SHAPING, SHAPING_S, step=0)
         for message, rate_hz in personality.streams_hz.items():
             self._schedule.set_interval(message, 1.0 / rate_hz, step=0)
-        self._pilot = Pilot()
+        self._answers = Answers(
+            self._reporter.sender,
+            self.parameters,
+            self._schedule,
+            autopilot=personality.autopilot,
+            physics_hz=physics_hz,
+        )
+        self._pilot = self._machine.boot()
+        self._watch_step = NEVER
         self._known, self._known_step = self._look(), 0
         self._measured: tuple[float, ...] = vehicle.position_velocity()
         self._measured_step = 0
-        self._commands: dict[int, Callable[[Any], int]] = {
-            dialect.MAV_CMD_COMPONENT_ARM_DISARM: self._arm_disarm,
-            dialect.MAV_CMD_NAV_TAKEOFF: self._take_off,
-            dialect.MAV_CMD_NAV_LAND: lambda _: self._change_mode(Mode.LAND),
-            dialect.MAV_CMD_DO_SET_MODE: self._do_set_mode,
-            dialect.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_message_interval,
-            dialect.MAV_CMD_REQUEST_MESSAGE: self._request_message,
-        }
-        self._origin = origin
         surroundings.settle(vehicle)
 
     @property
     def pilot(self) -> Pilot:
         """State of the mode machine."""
         return self._pilot
+
+    @property
+    def refused_setpoints(self) -> Counter[str]:
+        """Reason → how many set-points were not flown for it."""
+        return self._inlet.refused
 
     @property
     def time_s(self) -> float:
@@ -132,9 +150,13 @@ class Endpoint:
             return
         for frame in self.framer.frames(0, datagram):
             if frame.message == SET_POSITION_TARGET_LOCAL_NED:
-                self._position_target(unpack_position_target(frame.payload))
-            elif frame.message == dialect.MAVLINK_MSG_ID_COMMAND_LONG:
+                self._position_target(frame)
+            elif frame.message in COMMANDS:
                 self._command(frame)
+            elif frame.message == dialect.MAVLINK_MSG_ID_HEARTBEAT:
+                self._heartbeat(frame)
+            else:
+                self._answer(frame)
 
     def step(self, steps: int) -> None:
         """Fly this many physics steps, in bursts from one thing that is due to the next."""
@@ -144,7 +166,7 @@ class Endpoint:
             try:
                 vehicle.step(min(target, schedule.next_step) - vehicle.steps)
             except FlightModelDiverged:
-                self.lost, self._pilot = True, Pilot()
+                self.lost, self._pilot = True, self._machine.boot()
                 return
             if vehicle.steps >= schedule.next_step:
                 self._serve(schedule.take_due(vehicle.steps))
@@ -154,8 +176,49 @@ class Endpoint:
         frames, self._outbox = self._outbox, []
         return frames
 
-    def _send(self, frame: bytes) -> None:
-        self._outbox.append((self.vehicle.steps, frame))
+    def act(self, event: Callable[[Pilot, Situation, Rules], Outcome]) -> Result:
+        """Let the mode machine answer an event; tell the ground at once of a new mode, and in words."""
+        now, before = self._situation(), self._pilot
+        outcome = event(before, now, self._rules)
+        self._pilot = outcome.pilot
+        if (before.armed, before.mode) != (self._pilot.armed, self._pilot.mode):
+            self.tell(dialect.MAVLINK_MSG_ID_HEARTBEAT)
+        if before.armed != self._pilot.armed:
+            self.vehicle.arm() if self._pilot.armed else self.vehicle.disarm()
+        for severity, text in outcome.words:
+            self._say(severity, text)
+        self._be_patient()
+        return outcome.result
+
+    def knows(self, message: float) -> bool:
+        """Whether it can report this message id."""
+        return self._reporter.knows(message)
+
+    def tell(self, message: int) -> None:
+        """Report this message now."""
+        now = self._situation()
+        if message in MEASUREMENTS and self._measured_step != self.vehicle.steps:
+            self._measured = self._surroundings.sensors.measured((*now.position_ned, *now.velocity_ned), now.time_s)
+            self._measured_step = self.vehicle.steps
+        self._send(self._reporter.report(message, self._pilot, now, self._measured))
+
+    def tell_interval(self, message: int) -> None:
+        """Report how often this message is sent."""
+        self._send(self._reporter.message_interval(message, self._schedule.interval_s(message)))
+
+    def stream(self, message: int, interval_s: float) -> None:
+        """Send this message so often; 0 is off."""
+        self._schedule.set_interval(message, interval_s, step=self.vehicle.steps)
+
+    def height(self, altitude_m: float) -> float:
+        """m above home, of an altitude above sea level."""
+        return altitude_m - self._home.altitude_m
+
+    def _send(self, *frames: bytes) -> None:
+        self._outbox += [(self.vehicle.steps, frame) for frame in frames]
+
+    def _say(self, severity: Severity, text: str) -> None:
+        self._send(*self._reporter.words(severity, text))
 
     def _situation(self) -> Situation:
         """Where the vehicle is now; a set-point that comes at a step just served finds it known."""
@@ -173,52 +236,37 @@ class Endpoint:
         for key in due:
             if key == GUIDANCE:
                 self._surroundings.renew(self.vehicle, now.time_s)
-                self._take(modes.advance(self._pilot, now, self._failsafe), now)
-                self._fly(now, dt=PERIOD_S)
+                self.act(self._machine.advance)
+                self._fly(dt=PERIOD_S)
             elif key == SAMPLING:
                 self._surroundings.sensors.note((*now.position_ned, *now.velocity_ned), now.time_s)
             elif key == SHAPING:
                 self._take_up()
             elif key == WATCHDOG:
-                self._watch(now)
+                self._watch()
+            elif key == LISTING:
+                self._send(*self._answers.parameters.next_listed(step=self.vehicle.steps))
             elif key == TRUTH:
                 self._send(self._reporter.truth())
             else:
-                self._report(key, now)
+                self.tell(key)
 
-    def _report(self, message: int, now: Situation) -> None:
-        if message in MEASUREMENTS and self._measured_step != self.vehicle.steps:
-            self._measured = self._surroundings.sensors.measured((*now.position_ned, *now.velocity_ned), now.time_s)
-            self._measured_step = self.vehicle.steps
-        self._send(self._reporter.report(message, self._pilot, now, self._measured))
-
-    def _take(self, outcome: Outcome, now: Situation) -> int:
-        """Adopt the outcome of an event; tell the ground at once of a new mode, and in words."""
-        before, self._pilot = self._pilot, outcome.pilot
-        if (before.armed, before.mode) != (self._pilot.armed, self._pilot.mode):
-            self._report(dialect.MAVLINK_MSG_ID_HEARTBEAT, now)
-        if before.armed != self._pilot.armed:
-            self.vehicle.arm() if self._pilot.armed else self.vehicle.disarm()
-        for severity, text in outcome.words:
-            for frame in self._reporter.words(severity, text):
-                self._send(frame)
-        return ACCEPTED if outcome.accepted else REJECTED
-
-    def _fly(self, now: Situation, *, dt: float) -> None:
+    def _fly(self, *, dt: float) -> None:
         """Hand the mode's velocity to the flight controller, through whatever is wrong with it; dt: s of yaw rate."""
-        pilot = self._pilot
-        velocity = modes.command(pilot, now)
-        if pilot.mode is Mode.OFFBOARD:
+        pilot, now = self._pilot, self._situation()
+        velocity = self._machine.velocity(pilot, now, self._rules)
+        steered = self._machine.steered(pilot)
+        if steered:
             velocity = self._shaped(self._surroundings.flown(velocity, now.time_s), now)
         else:
             self._motion = None
-        yaw = modes.heading(pilot, dt)
+        yaw = heading(pilot, dt, steered=steered)
         if yaw != pilot.yaw:
             self._pilot = pilot._replace(yaw=yaw)
         self.vehicle.set_velocity(velocity, yaw)
 
     def _shaped(self, velocity_ned: Vector, now: Situation) -> Vector:
-        """Where a slow vehicle is on its way to this velocity. OFFBOARD begins with the one it has."""
+        """Where a slow vehicle is on its way to this velocity. It begins with the one it has."""
         if self._shape is None:
             return velocity_ned
         self._wanted_ned = velocity_ned
@@ -228,126 +276,80 @@ class Endpoint:
 
     def _take_up(self) -> None:
         """Every SHAPING_S: a little nearer to what is wanted."""
-        if self._shape is None or self._motion is None or self._pilot.mode is not Mode.OFFBOARD:
+        if self._shape is None or self._motion is None or not self._machine.steered(self._pilot):
             return
         north, east, down = self._wanted_ned
         self._motion = self._shape(self._motion, (north, east))
         self.vehicle.set_velocity((*self._motion.velocity_ne, down), self._pilot.yaw)
 
-    def _position_target(self, target: PositionTarget) -> None:
+    def _position_target(self, frame: Frame) -> None:
+        target = unpack_position_target(frame.payload)
         if target.target_system not in (0, self.system) or target.target_component not in (0, AUTOPILOT):
             return
-        setpoint = self._setpoint(target)
+        if not self._machine.hears(self._pilot):
+            self._inlet.refused["mode"] += 1
+            return
+        setpoint, words = self._inlet.admit(
+            target,
+            (frame.system, frame.component),
+            time_s=self.time_s,
+            yaw=self.vehicle.yaw,
+            flown=self._machine.steered(self._pilot),
+            keep_alive_s=self._rules.setpoint_silence_s,
+        )
+        if words:
+            self._say(Severity.WARNING, words)
         if setpoint is None:
-            self.refused_setpoints += 1
             return
         north, east, _ = setpoint.velocity_ned
         if self.first_motion_step is None and math.hypot(north, east) > STANDS_STILL:
             self.first_motion_step = self.vehicle.steps
-        self._pilot = modes.hear(self._pilot, setpoint)
-        if not self._schedule.has(WATCHDOG):
-            self._be_patient(setpoint)
-        if self._pilot.mode is Mode.OFFBOARD:
-            self._fly(self._situation(), dt=0.0)
+        self._pilot = self._machine.hear(self._pilot, setpoint)
+        self._be_patient()
+        if self._machine.steered(self._pilot):
+            self._fly(dt=0.0)
 
-    def _be_patient(self, setpoint: Setpoint) -> None:
-        """Look again at the step at which this set-point will be too old."""
-        silence = math.ceil(self._failsafe.setpoint_silence_s * self._hz)
-        self._schedule.once(WATCHDOG, step=round(setpoint.time_s * self._hz) + silence)
-
-    def _watch(self, now: Situation) -> None:
-        """The set-point waited for is too old, or a newer one has come meanwhile."""
-        setpoint = self._pilot.setpoint
-        if setpoint is not None and modes.hears_setpoints(self._pilot, now, self._failsafe):
-            self._be_patient(setpoint)
+    def _be_patient(self) -> None:
+        """Look again at the step at which patience ends, unless that will be done before."""
+        soonest = self._machine.deadline(self._pilot, self._rules)
+        if soonest * self._hz >= self._watch_step:
             return
-        self._take(modes.advance(self._pilot, now, self._failsafe), now)
-        self._fly(now, dt=0.0)
+        step = max(math.ceil((soonest - ON_TIME) * self._hz), self.vehicle.steps + 1)
+        self._watch_step = step
+        self._schedule.once(WATCHDOG, step=step)
 
-    def _setpoint(self, target: PositionTarget) -> Setpoint | None:
-        """The velocity set-point in a message; None where it is none that we fly."""
-        mask = target.type_mask
-        yaw = None if mask & IGNORE_YAW else target.yaw
-        yaw_rate = 0.0 if mask & IGNORE_YAW_RATE else target.yaw_rate
-        numbers = (target.vx, target.vy, target.vz, yaw_rate, yaw or 0.0)
-        if mask not in VELOCITY_MASKS or not all(map(math.isfinite, numbers)):
-            return None
-        velocity = target.vx, target.vy, target.vz
-        if target.coordinate_frame == BODY_NED:
-            velocity = _turned(velocity, self.vehicle.yaw)
-            yaw = None if yaw is None else yaw + self.vehicle.yaw
-        elif target.coordinate_frame != LOCAL_NED:
-            return None
-        return Setpoint(self.time_s, velocity, yaw, yaw_rate)
+    def _watch(self) -> None:
+        """A link that was waited for is silent, or was heard meanwhile."""
+        self._watch_step = NEVER
+        if self._machine.deadline(self._pilot, self._rules) > self.time_s + ON_TIME:
+            self._be_patient()
+            return
+        self.act(self._machine.advance)
+        self._fly(dt=0.0)
 
     def _command(self, frame: Frame) -> None:
-        try:
-            command = decode(frame)
-        except dialect.MAVError:
+        asked = request(frame, self.system, self.personality)
+        if asked is None:
             return
-        if command.target_system not in (0, self.system) or command.target_component not in (0, AUTOPILOT):
-            return
-        handler = self._commands.get(command.command)
-        result = UNSUPPORTED if handler is None else handler(command)
+        result = obey(asked, self)
         self._send(
-            self._reporter.acknowledge(command.command, result, to_system=frame.system, to_component=frame.component)
+            self._reporter.acknowledge(asked.acknowledged, result, to_system=frame.system, to_component=frame.component)
         )
 
-    def _arm_disarm(self, command: Any) -> int:
-        now = self._situation()
-        if command.param1 == 1.0:
-            return self._take(modes.arm(self._pilot, now), now)
-        if command.param1 == 0.0:
-            return self._take(modes.disarm(self._pilot, now, force=command.param2 == FORCE_DISARM), now)
-        return DENIED
+    def _heartbeat(self, frame: Frame) -> None:
+        if _is_station(frame, self.parameters):
+            self.act(lambda pilot, now, _: self._machine.hear_station(pilot, now))
 
-    def _take_off(self, command: Any) -> int:
-        """param7 is the altitude above mean sea level, as PX4 reads it; NaN leaves it to the vehicle."""
-        height = modes.DEFAULT_TAKEOFF_HEIGHT
-        if math.isfinite(command.param7):
-            height = command.param7 - self._origin.altitude_m
-        now = self._situation()
-        return self._take(modes.take_off(self._pilot, now, height), now)
-
-    def _do_set_mode(self, command: Any) -> int:
-        if not math.isfinite(command.param2) or not math.isfinite(command.param3):
-            return DENIED
-        mode = self._personality.mode_of(int(command.param2), int(command.param3))
-        if mode is None or mode is Mode.TAKEOFF:  # a take-off needs an altitude: NAV_TAKEOFF carries it
-            return UNSUPPORTED
-        return self._change_mode(mode)
-
-    def _change_mode(self, mode: Mode) -> int:
-        now = self._situation()
-        return self._take(modes.set_mode(self._pilot, now, mode, self._failsafe), now)
-
-    def _set_message_interval(self, command: Any) -> int:
-        """param1 message id, param2 interval in µs: 0 the default rate, −1 off."""
-        message, interval_us = command.param1, command.param2
-        if not math.isfinite(interval_us) or not self._reporter.knows(message):
-            return DENIED
-        default_hz = self._personality.streams_hz.get(int(message), 0.0)
-        default_s = 1.0 / default_hz if default_hz else 0.0
-        interval_s = interval_us / 1e6 if interval_us else default_s
-        self._schedule.set_interval(int(message), interval_s, step=self.vehicle.steps)
-        return ACCEPTED
-
-    def _request_message(self, command: Any) -> int:
-        if command.param1 == dialect.MAVLINK_MSG_ID_MESSAGE_INTERVAL and self._reporter.knows(command.param2):
-            asked = int(command.param2)
-            self._send(self._reporter.message_interval(asked, self._schedule.interval_s(asked)))
-            return ACCEPTED
-        if not self._reporter.knows(command.param1):
-            return DENIED
-        self._report(int(command.param1), self._situation())
-        return ACCEPTED
+    def _answer(self, frame: Frame) -> None:
+        changes = self.parameters.changes
+        self._send(*self._answers.answer(frame, step=self.vehicle.steps))
+        if self.parameters.changes != changes:
+            self._rules = rules(self.parameters)
+            self._be_patient()
 
 
-def _turned(velocity: tuple[float, float, float], yaw: float) -> tuple[float, float, float]:
-    """From forward-right-down to north-east-down, level."""
-    forward, right, down = velocity
-    return (
-        forward * math.cos(yaw) - right * math.sin(yaw),
-        forward * math.sin(yaw) + right * math.cos(yaw),
-        down,
-    )
+def _is_station(frame: Frame, parameters: Parameters) -> bool:
+    """Whether a heartbeat is our ground station's: for ArduPilot the system that it is told, for PX4 any."""
+    if "SYSID_MYGCS" in parameters:
+        return frame.system == parameters.get("SYSID_MYGCS")
+    return frame.payload[TYPE_AT : TYPE_AT + 1] == bytes([dialect.MAV_TYPE_GCS])

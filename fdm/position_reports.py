@@ -13,7 +13,6 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from fdm.craft import EPOCH_US, Craft, Moment, Report
-from fdm.modes import Mode
 from wire.payloads import LocalPosition, pack_local_position
 
 SATELLITES, DILUTION = 14, 0.7
@@ -122,15 +121,17 @@ def _gps_global_origin(craft: Craft, moment: Moment) -> Any:
 
 
 def _home_position(craft: Craft, moment: Moment) -> Any:
-    """The pad, and where it is from the estimator's origin; which way it lies or is approached is nobody's concern."""
+    """Where it was armed, and where that is from the estimator's origin; which way it lies is nobody's concern."""
+    north, east, down = moment.pilot.home_ned
     origin_n, origin_e = craft.origin_ne
+    latitude, longitude = displaced(craft.home.latitude_deg, craft.home.longitude_deg, north, east)
     return dialect.MAVLink_home_position_message(
-        round(craft.home.latitude_deg * 1e7),
-        round(craft.home.longitude_deg * 1e7),
-        round(craft.home.altitude_m * 1e3),
-        0.0 - origin_n,
-        0.0 - origin_e,
-        0.0,
+        round(latitude * 1e7),
+        round(longitude * 1e7),
+        round((craft.home.altitude_m - down) * 1e3),
+        north - origin_n,
+        east - origin_e,
+        down,
         [1.0, 0.0, 0.0, 0.0],
         *(math.nan,) * 3,
         time_usec=moment.boot_us,
@@ -152,7 +153,7 @@ def _position_target(craft: Craft, moment: Moment) -> Any:
     pilot = moment.pilot
     position, velocity, yaw, yaw_rate = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), pilot.yaw, 0.0
     mask = VELOCITY_ONLY & ~IGNORE_YAW
-    if pilot.mode is Mode.OFFBOARD and pilot.setpoint is not None:
+    if craft.personality.machine.steered(pilot) and pilot.setpoint is not None:
         setpoint = pilot.setpoint
         velocity, yaw_rate = setpoint.velocity_ned, setpoint.yaw_rate
         if setpoint.yaw is None:

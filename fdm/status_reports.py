@@ -12,7 +12,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from fdm.craft import EPOCH_US, Craft, Moment, Report
-from fdm.modes import Mode
+from fdm.modes import phase
 from fdm.position_reports import RECEIVER_M, accuracy_m
 
 SENSORS = (
@@ -30,11 +30,6 @@ SENSORS = (
 ESTIMATES = dialect.MAV_SYS_STATUS_AHRS
 """Healthy once sensors have settled."""
 PREARM, MOTORS = dialect.MAV_SYS_STATUS_PREARM_CHECK, dialect.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
-
-LANDED_STATES = {
-    Mode.TAKEOFF: dialect.MAV_LANDED_STATE_TAKEOFF,
-    Mode.LAND: dialect.MAV_LANDED_STATE_LANDING,
-}
 
 SETTLED = 0x033F
 """Flags of an estimator that knows attitude, velocity and position, and can foretell them. Both autopilots number
@@ -80,7 +75,7 @@ def _heartbeat(craft: Craft, moment: Moment) -> Any:
 def _system_state(moment: Moment) -> int:
     if not moment.pilot.armed:
         return int(dialect.MAV_STATE_STANDBY)
-    in_failsafe = moment.pilot.land_at_s is not None
+    in_failsafe = moment.pilot.loss is not None or moment.pilot.station_lost
     return int(dialect.MAV_STATE_CRITICAL if in_failsafe else dialect.MAV_STATE_ACTIVE)
 
 
@@ -88,7 +83,7 @@ def _sys_status(craft: Craft, moment: Moment) -> Any:
     battery = craft.vehicle.battery
     present = SENSORS | ESTIMATES | PREARM | MOTORS
     enabled = present if moment.pilot.armed else present & ~MOTORS
-    health = SENSORS | MOTORS | (ESTIMATES | PREARM if moment.is_ready else 0)
+    health = SENSORS | MOTORS | (ESTIMATES | PREARM if craft.is_ready(moment.now) else 0)
     return dialect.MAVLink_sys_status_message(
         present,
         enabled,
@@ -117,12 +112,8 @@ def _battery_status(craft: Craft, _moment: Moment) -> Any:
 
 
 def _extended_sys_state(_craft: Craft, moment: Moment) -> Any:
-    landed = dialect.MAV_LANDED_STATE_IN_AIR
-    if moment.now.on_ground:
-        landed = dialect.MAV_LANDED_STATE_ON_GROUND
-    elif moment.pilot.armed:
-        landed = LANDED_STATES.get(moment.pilot.mode, landed)
-    return dialect.MAVLink_extended_sys_state_message(dialect.MAV_VTOL_STATE_UNDEFINED, landed)
+    landed = phase(moment.pilot, moment.now)
+    return dialect.MAVLink_extended_sys_state_message(dialect.MAV_VTOL_STATE_UNDEFINED, landed.value)
 
 
 def _autopilot_version(craft: Craft, _moment: Moment) -> Any:
@@ -148,10 +139,10 @@ def _system_time(_craft: Craft, moment: Moment) -> Any:
     return dialect.MAVLink_system_time_message(EPOCH_US + moment.boot_us, moment.boot_ms)
 
 
-def _ekf_status(_craft: Craft, moment: Moment) -> Any:
+def _ekf_status(craft: Craft, moment: Moment) -> Any:
     """ArduPilot's. What is estimated is what is measured, so nothing is left to disagree."""
     return dialect.MAVLink_ekf_status_report_message(
-        SETTLED if moment.is_ready else SETTLING, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        SETTLED if craft.is_ready(moment.now) else SETTLING, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     )
 
 
@@ -159,7 +150,7 @@ def _estimator_status(craft: Craft, moment: Moment) -> Any:
     """PX4's, as above; it adds what it claims to err [m]."""
     return dialect.MAVLink_estimator_status_message(
         moment.boot_us,
-        SETTLED if moment.is_ready else SETTLING,
+        SETTLED if craft.is_ready(moment.now) else SETTLING,
         0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
         accuracy_m(craft),
         RECEIVER_M,

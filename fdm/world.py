@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 import pymap3d
 
 from fdm.endpoint import Endpoint
 from fdm.noise import Purpose, generator
+from fdm.parameters import table
+from fdm.personality import PERSONALITIES, Name
 from fdm.shaping import shape_of
 from fdm.surroundings import Surroundings
 from fdm.vehicle import Geodetic, Vehicle
@@ -19,14 +22,34 @@ SITE = Geodetic(41.1512, -81.4161, 320.0)
 
 
 class World:
-    """The vehicles of a scenario, on their pads, disarmed, at step 0."""
+    """The vehicles of a scenario, on their pads, disarmed, at step 0.
 
-    def __init__(self, scenario: Scenario, *, seed: int = 1) -> None:
+    autopilot:       what they are taken for
+    stock_failsafes: with the autopilot's own failsafe parameters instead of ours
+    origins_ne:      (N, 2) m from each vehicle's pad to where its own positions count from; the pads, unless told
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        *,
+        seed: int = 1,
+        autopilot: Name = "px4",
+        stock_failsafes: bool = False,
+        origins_ne: npt.ArrayLike | None = None,
+    ) -> None:
         self.physics_hz = scenario.time.physics_hz
         self.steps = 0
         self._run_up_steps = scenario.time.ticks(scenario.mission.run_up_s) * scenario.time.steps_per_tick
         self._mission_step: int | None = None
-        self.endpoints = [_endpoint(scenario, system, pad, seed) for system, pad in enumerate(pads(scenario), start=1)]
+        places = pads(scenario)
+        origins = np.zeros((len(places), 2)) if origins_ne is None else np.asarray(origins_ne, float)
+        if origins.shape != (len(places), 2) or not np.isfinite(origins).all():
+            raise ValueError(f"origins_ne must be {len(places)} rows of two finite numbers, not {origins_ne!r}")
+        self.endpoints = [
+            _endpoint(scenario, system, pad, seed, autopilot, stock_failsafes, (float(north), float(east)))
+            for system, (pad, (north, east)) in enumerate(zip(places, origins, strict=True), start=1)
+        ]
 
     def deliver(self, system: int, datagram: bytes) -> None:
         """Hand a datagram to one vehicle, now."""
@@ -100,19 +123,30 @@ def pads(scenario: Scenario) -> list[Geodetic]:
     ]
 
 
-def _endpoint(scenario: Scenario, system: int, pad: Geodetic, seed: int) -> Endpoint:
+def _endpoint(
+    scenario: Scenario,
+    system: int,
+    pad: Geodetic,
+    seed: int,
+    autopilot: Name,
+    stock_failsafes: bool,
+    origin_ne: tuple[float, float],
+) -> Endpoint:
     vehicle = Vehicle(
         home=pad,
         yaw=math.radians(scenario.mission.leg[0].heading_deg),
         physics_hz=scenario.time.physics_hz,
         seed=int(generator(seed, system, Purpose.TURBULENCE).integers(2**31)),
     )
-    surroundings = Surroundings(scenario, vehicle=system, seed=seed)
     return Endpoint(
         vehicle,
-        surroundings,
+        Surroundings(scenario, vehicle=system, seed=seed),
         system=system,
-        origin=pad,
+        home=pad,
         physics_hz=scenario.time.physics_hz,
+        personality=PERSONALITIES[autopilot],
+        parameters=table(autopilot, stock_failsafes, system=system),
+        origin_ne=origin_ne,
+        noise=scenario.noise,
         shape=shape_of(scenario),
     )

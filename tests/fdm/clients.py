@@ -86,7 +86,7 @@ class Flight(Station):
         vehicle = Vehicle(home=PLACE, yaw=yaw, physics_hz=hz)
         told = told or scenario()
         surroundings = Surroundings(told, vehicle=1, seed=seed)
-        self.endpoint = Endpoint(vehicle, surroundings, system=1, origin=PLACE, physics_hz=hz, shape=shape_of(told))
+        self.endpoint = Endpoint(vehicle, surroundings, system=1, home=PLACE, physics_hz=hz, shape=shape_of(told))
         self.vehicle = vehicle
 
     @property
