@@ -1,0 +1,130 @@
+"""What a serial link carries: positions are asked for as often as fits, and what does not fit is refused in numbers.
+
+A telemetry radio is half-duplex: both directions share its speed, which is summed here, in bytes of our own frames at
+their full length. What an autopilot streams unasked is not counted: it must be turned off there (docs/hardware.md).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from gcs import messages
+from gcs.autopilots import ardupilot, px4
+from scenarios import Scenario
+from wire.connection import Connection
+from wire.frames import CRC, HEADER_2, SIGNATURE
+from wire.payloads import SET_POSITION_TARGET_LOCAL_NED
+
+POSITIONS_AT_MOST = 5
+"""A tick: real links deliver at any moment of it; asked once, a flight ended 0.5 m from its lockstep twin."""
+BITS_A_BYTE = 10
+"""8N1: a start bit, eight, a stop bit."""
+RESERVE = 0.1
+"""Of the link, for commands, their answers, words, and what is sent again."""
+BEAT_S = 1.0
+"""Between two heartbeats, theirs and ours."""
+USUAL_SPEEDS = (57_600, 115_200, 230_400, 460_800, 921_600, 1_500_000, 3_000_000)
+"""Bits a second that radios and autopilots can be set to."""
+LONGEST_PERIOD_S = 0.4
+"""What a scenario may say: vehicles lose patience after 0.5 s."""
+
+
+class LinkTooSlow(ValueError):
+    """A link that cannot carry what the scenario needs, in one sentence with the arithmetic."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Load:
+    """Bytes a second of one vehicle, both ways."""
+
+    setpoint: int
+    """Bytes of one set-point."""
+    position: int
+    """Bytes of one LOCAL_POSITION_NED."""
+    slow: float
+    """Bytes a second of heartbeats and slow streams."""
+
+    def each(self, period_s: float, positions: int) -> float:
+        """A set-point and so many positions a tick, and the slow rest."""
+        return (self.setpoint + positions * self.position) / period_s + self.slow
+
+
+def positions_per_tick(connections: Iterable[Connection], scenario: Scenario, *, signed: bool) -> int:
+    """How often in a tick vehicles are to tell where they are: 5 to 1, as every serial link allows.
+
+    Where the scenario says how often, it is that or nothing. Vehicles are taken to be shared evenly among the links.
+    Raises LinkTooSlow.
+    """
+    links = list(connections)
+    told = scenario.time.positions_per_tick
+    wanted = range(POSITIONS_AT_MOST, 0, -1) if told is None else (told,)
+    slow = [link for link in links if link.bits_per_s is not None]
+    if not slow:
+        return wanted[0]
+    vehicles = math.ceil(scenario.swarm.count / len(links))
+    slowest = min(slow, key=_carries)
+    load = _load(signed=signed)
+    for positions in wanted:
+        if vehicles * load.each(scenario.time.period_s, positions) <= _carries(slowest):
+            return positions
+    raise LinkTooSlow(_sentence(slowest, scenario, vehicles, load, wanted[-1], signed=signed))
+
+
+def _load(*, signed: bool) -> _Load:
+    beats = 2 * _frame(messages.HEARTBEAT, signed=signed) / BEAT_S
+    slow = max(
+        sum(_frame(message, signed=signed) / interval_s for message, interval_s in streams)
+        for streams in (px4.SLOW_S, ardupilot.SLOW_S)
+    )
+    return _Load(
+        setpoint=_frame(SET_POSITION_TARGET_LOCAL_NED, signed=signed),
+        position=_frame(messages.LOCAL_POSITION_NED, signed=signed),
+        slow=beats + slow,
+    )
+
+
+def _frame(message: int, *, signed: bool) -> int:
+    """Bytes of a frame of this message whose payload ends in no zeros."""
+    payload: int = dialect.mavlink_map[message].unpacker.size
+    return HEADER_2 + payload + CRC + SIGNATURE * signed
+
+
+def _carries(link: Connection) -> float:
+    """Bytes a second that may be planned with."""
+    assert link.bits_per_s is not None
+    return link.bits_per_s / BITS_A_BYTE * (1 - RESERVE)
+
+
+def _sentence(link: Connection, scenario: Scenario, vehicles: int, load: _Load, positions: int, *, signed: bool) -> str:
+    period_s = scenario.time.period_s
+    each = load.each(period_s, positions)
+    hz, raw = 1 / period_s, (link.bits_per_s or 0) / BITS_A_BYTE
+    return (
+        f"{link}: {vehicles} vehicles at {hz:g} Hz{', signed,' if signed else ''} need {vehicles} × {each:.0f} = "
+        f"{vehicles * each:.0f} bytes/s both ways (each {hz:g} set-points of {load.setpoint}, {positions * hz:g} "
+        f"positions of {load.position} and {load.slow:.0f} of heartbeats and slow streams), and "
+        f"{link.bits_per_s} / {BITS_A_BYTE} = {raw:g} less {RESERVE:.0%} in reserve is {_carries(link):.0f}; what would fit: {', or '.join(_remedies(link, scenario, vehicles, load, positions))}"
+    )
+
+
+def _remedies(link: Connection, scenario: Scenario, vehicles: int, load: _Load, positions: int) -> list[str]:
+    """What would have to be otherwise, each alone."""
+    period_s, carries = scenario.time.period_s, _carries(link)
+    remedies = []
+    if fewer := int(carries / load.each(period_s, positions)):
+        remedies.append(f"{fewer} vehicle{'s' if fewer > 1 else ''} on this link")
+    if (left := carries - vehicles * load.slow) > 0:
+        hz = scenario.time.physics_hz
+        longer_s = math.ceil(vehicles * (load.setpoint + positions * load.position) / left * hz - 1e-9) / hz
+        if longer_s <= LONGEST_PERIOD_S:
+            remedies.append(f"time.period_s = {longer_s:g}")
+    if positions > 1:
+        remedies.append("a smaller time.positions_per_tick")
+    needed = vehicles * load.each(period_s, positions) * BITS_A_BYTE / (1 - RESERVE)
+    speed = next((usual for usual in USUAL_SPEEDS if usual >= needed), None)
+    remedies.append(f"{speed} bits/s" if speed else "a network instead of a serial link")
+    return remedies
