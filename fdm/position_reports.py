@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
+import pymap3d
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from fdm.craft import EPOCH_US, Craft, Moment, Report
@@ -113,21 +114,19 @@ def _vfr_hud(craft: Craft, moment: Moment) -> Any:
 
 
 def _gps_global_origin(craft: Craft, moment: Moment) -> Any:
-    home = craft.home
-    latitude, longitude = displaced(home.latitude_deg, home.longitude_deg, *craft.origin_ne)
-    return dialect.MAVLink_gps_global_origin_message(
-        round(latitude * 1e7), round(longitude * 1e7), round(home.altitude_m * 1e3), moment.boot_us
-    )
+    latitude, longitude = _place_from_pad(craft, *craft.origin_ne)
+    altitude_mm = round(craft.home.altitude_m * 1e3)
+    return dialect.MAVLink_gps_global_origin_message(latitude, longitude, altitude_mm, moment.boot_us)
 
 
 def _home_position(craft: Craft, moment: Moment) -> Any:
     """Where it was armed, and where that is from the estimator's origin; which way it lies is nobody's concern."""
     north, east, down = moment.pilot.home_ned
     origin_n, origin_e = craft.origin_ne
-    latitude, longitude = displaced(craft.home.latitude_deg, craft.home.longitude_deg, north, east)
+    latitude, longitude = _place_from_pad(craft, north, east)
     return dialect.MAVLink_home_position_message(
-        round(latitude * 1e7),
-        round(longitude * 1e7),
+        latitude,
+        longitude,
         round((craft.home.altitude_m - down) * 1e3),
         north - origin_n,
         east - origin_e,
@@ -189,8 +188,17 @@ EQUATOR_M, ECCENTRICITY_SQUARED = 6378137.0, 6.69437999014e-3
 """WGS-84."""
 
 
-def displaced(latitude: float, longitude: float, north: float, east: float) -> tuple[float, float]:
-    """A place [degrees] so many metres away from another, by the radii of curvature there; near ones only."""
+def _place_from_pad(craft: Craft, north: float, east: float) -> tuple[int, int]:
+    """A place so many metres away in the tangent plane there: 1e-7 degrees."""
+    home = craft.home
+    latitude, longitude, _ = pymap3d.ned2geodetic(
+        north, east, 0.0, home.latitude_deg, home.longitude_deg, home.altitude_m
+    )
+    return round(float(latitude) * 1e7), round(float(longitude) * 1e7)
+
+
+def _displaced(latitude: float, longitude: float, north: float, east: float) -> tuple[float, float]:
+    """A place [degrees] so many metres away from another, by the radii of curvature there; a few metres only."""
     bulge = 1.0 - ECCENTRICITY_SQUARED * math.sin(math.radians(latitude)) ** 2
     along_parallel = EQUATOR_M / math.sqrt(bulge)
     along_meridian = along_parallel * (1.0 - ECCENTRICITY_SQUARED) / bulge
@@ -204,7 +212,7 @@ def _measured_place(craft: Craft, moment: Moment) -> tuple[int, int]:
     """The true place, moved by the error of the measured one: 1e-7 degrees."""
     state, truth = craft.vehicle.state(), craft.vehicle.position_velocity()
     north, east = moment.measured[0] - truth[0], moment.measured[1] - truth[1]
-    latitude, longitude = displaced(state.latitude_deg, state.longitude_deg, north, east)
+    latitude, longitude = _displaced(state.latitude_deg, state.longitude_deg, north, east)
     return round(latitude * 1e7), round(longitude * 1e7)
 
 
