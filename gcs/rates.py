@@ -107,7 +107,8 @@ def _sentence(link: Connection, scenario: Scenario, vehicles: int, load: _Load, 
         f"{link}: {vehicles} vehicles at {hz:g} Hz{', signed,' if signed else ''} need {vehicles} × {each:.0f} = "
         f"{vehicles * each:.0f} bytes/s both ways (each {hz:g} set-points of {load.setpoint}, {positions * hz:g} "
         f"positions of {load.position} and {load.slow:.0f} of heartbeats and slow streams), and "
-        f"{link.bits_per_s} / {BITS_A_BYTE} = {raw:g} less {RESERVE:.0%} in reserve is {_carries(link):.0f}; what would fit: {', or '.join(_remedies(link, scenario, vehicles, load, positions))}"
+        f"{link.bits_per_s} / {BITS_A_BYTE} = {raw:g} less {RESERVE:.0%} in reserve is {_carries(link):.0f}; "
+        f"what would fit: {', or '.join(_remedies(link, scenario, vehicles, load, positions))}"
     )
 
 
