@@ -267,13 +267,13 @@ class Flight:
         )
 
     def _ask(self, state: FlightState, swarm: Swarm, what: Callable[[int], tuple[Command, ...]]) -> Step:
-        """Ask every vehicle for what it still lacks; for the same thing again only after RETRY_S."""
+        """Ask every vehicle for what it still lacks; for the same, or less of it, only after RETRY_S."""
         commands: Commands = []
         asked = list(state.asked)
         patience = self.scenario.time.ticks(RETRY_S)
         for row, system in enumerate(swarm.ids):
             wanted = what(row)
-            repeated = wanted == asked[row].commands and state.tick - asked[row].tick < patience
+            repeated = set(wanted) <= set(asked[row].commands) and state.tick - asked[row].tick < patience
             if wanted and not repeated:
                 asked[row] = Asked(wanted, state.tick)
                 commands += [(system, command) for command in wanted]

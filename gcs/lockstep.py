@@ -5,9 +5,16 @@ Runs as fast as JSBSim does, and the same every time. The only module of the gro
 
 from __future__ import annotations
 
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
 from fdm.world import World
 from scenarios import Scenario
 from wire.frames import Frame, Framer
+
+Array = npt.NDArray[np.float64]
 
 EPOCH_NS = 1_577_836_800_000_000_000
 """2020-01-01T00:00Z: when every lockstep flight begins."""
@@ -22,9 +29,22 @@ class Lockstep:
         self._framer = Framer()
 
     @staticmethod
-    def of(scenario: Scenario, *, seed: int) -> Lockstep:
-        """The vehicles of a scenario, on their pads."""
-        return Lockstep(World(scenario, seed=seed))
+    def of(
+        scenario: Scenario,
+        *,
+        seed: int,
+        autopilot: Literal["px4", "ardupilot"] = "px4",
+        stock_failsafes: bool = False,
+        origins_ne: Array | None = None,
+    ) -> Lockstep:
+        """The vehicles of a scenario, on their pads.
+
+        stock_failsafes: as each autopilot is delivered, not as we ask for;  origins_ne: (N, 2) m from each pad to where
+        that vehicle counts from; its pad, where not given.
+        """
+        return Lockstep(
+            World(scenario, seed=seed, autopilot=autopilot, stock_failsafes=stock_failsafes, origins_ne=origins_ne)
+        )
 
     def now(self) -> int:
         """ns since 1970, from the step count."""

@@ -57,6 +57,8 @@ class Swarm:
     """(N, 3) rad."""
     heartbeat_ns: Integers
     """(N,) when the autopilot was last alive."""
+    since_ns: Integers
+    """(N,) when it was first heard."""
     autopilot: Integers
     """(N,) MAV_AUTOPILOT of the heartbeat; 0 until it came."""
     custom_mode: Integers
@@ -99,6 +101,7 @@ class Swarm:
             home_down=np.zeros(n),
             attitude_rpy=np.full((n, 3), np.nan),
             heartbeat_ns=np.full(n, NEVER),
+            since_ns=np.full(n, NEVER),
             autopilot=np.zeros(n, np.int64),
             custom_mode=np.zeros(n, np.int64),
             armed=np.zeros(n, bool),
@@ -218,6 +221,8 @@ REBOOTED_MS = 2000
 def _heartbeat(draft: _Draft, row: int, frame: Frame) -> None:
     beat = decode(frame)
     draft.set("heartbeat_ns", row, frame.time_ns)
+    if draft.get("since_ns", row) == NEVER:
+        draft.set("since_ns", row, frame.time_ns)
     draft.set("autopilot", row, beat.autopilot)
     draft.set("custom_mode", row, beat.custom_mode)
     draft.set("armed", row, bool(beat.base_mode & messages.ARMED))
@@ -235,13 +240,16 @@ def _origin(draft: _Draft, row: int, frame: Frame) -> None:
     draft.set("origin", row, (origin.latitude / 1e7, origin.longitude / 1e7, origin.altitude / 1e3))
 
 
+UNTOLD_NS = 3_000_000_000
+"""Who has been heard for so long and has not told its origin, though it was asked, never will."""
 SAME_MOMENT_MS = 250
 """Two reports of one vehicle no further apart tell of one place, the way it flew between them added."""
 
 
 def _global_position(draft: _Draft, row: int, frame: Frame) -> None:
     """Where the origin is of a vehicle that never tells: back from where it is, by what both reports say of that."""
-    if math.isfinite(draft.get("origin", row)[0]):
+    since_ns = draft.get("since_ns", row)
+    if math.isfinite(draft.get("origin", row)[0]) or since_ns == NEVER or frame.time_ns - since_ns < UNTOLD_NS:
         return
     place, position = decode(frame), draft.position(row)
     if position is None or abs(place.time_boot_ms - position.time_boot_ms) > SAME_MOMENT_MS:

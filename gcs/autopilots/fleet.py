@@ -40,7 +40,7 @@ class Fleet:
     def known(self, swarm: Swarm, row: int) -> bool:
         """All that must be known before arming has been told, and the vehicle is ready to be armed."""
         kind = self._kind(swarm, row)
-        if kind is None or not kind.ready(swarm)[row]:
+        if kind is None or not kind.ready(swarm)[row] or untold(int(swarm.autopilot[row]), swarm.parameters[row]):
             return False
         places = (*swarm.position_ned[row], *swarm.origin[row], swarm.home_m[row])
         accuracy_told = not np.isnan(swarm.accuracy_m[row])

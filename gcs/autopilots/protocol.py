@@ -78,7 +78,7 @@ def may_arm(swarm: Swarm, row: int) -> bool:
 def missing(swarm: Swarm, row: int) -> tuple[Command, ...]:
     """What any autopilot is asked for once: places, and how well it knows them.
 
-    An origin that nobody told follows from GLOBAL_POSITION_INT. The accuracy is asked for anew as long as anything
+    An origin that is never told follows from GLOBAL_POSITION_INT. The accuracy is asked for anew as long as anything
     else keeps the vehicle on the ground: receivers get better.
     """
     asked = [RequestMessage(messages.GPS_RAW_INT)]

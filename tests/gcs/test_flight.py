@@ -16,6 +16,7 @@ START = 1_577_836_800_000_000_000
 PERIOD_S, PERIOD_NS = 0.1, 100_000_000
 MODE = {name: mode.custom_mode for name, mode in PX4_MODES.items()}
 HEIGHT = 10.0
+PROTECTED = {"COM_OF_LOSS_T": 0.5, "COM_OBL_RC_ACT": 4, "NAV_DLL_ACT": 3, "COM_DL_LOSS_T": 10, "MPC_XY_VEL_MAX": 12.0}
 EVERYBODY = range(1, 7)
 
 
@@ -41,6 +42,7 @@ class Fleet:
             battery=np.full(n, 0.9),
             home_m=np.full(n, 320.0),
             accuracy_m=np.full(n, 0.3),
+            parameters=(PROTECTED,) * n,
         )
 
     def heard(self, tick, now_ns):

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from gcs.telemetry import REBOOTED_MS, Swarm, observe
+from gcs.telemetry import REBOOTED_MS, UNTOLD_NS, Swarm, observe
 from wire import parameters
 from wire.frames import Framer, Sender
 from wire.ids import AUTOPILOT, TRUTH
@@ -248,9 +248,12 @@ def test_home_moved_at_arming_moves_the_height_with_it():
 # --- an origin that nobody tells
 
 
-def place(latitude, longitude, altitude, boot_ms):
+LATER = NOW + UNTOLD_NS
+
+
+def place(latitude, longitude, altitude, boot_ms, *, time_ns=LATER):
     scaled = round(latitude * 1e7), round(longitude * 1e7), round(altitude * 1e3)
-    return said(dialect.MAVLink_global_position_int_message(boot_ms, *scaled, 0, 0, 0, 0, 0))
+    return said(dialect.MAVLink_global_position_int_message(boot_ms, *scaled, 0, 0, 0, 0, 0), time_ns=time_ns)
 
 
 @pytest.mark.parametrize("late_ms", [-250, 0, 100, 250])
@@ -259,25 +262,34 @@ def test_an_origin_that_is_not_told_follows_from_two_reports_of_one_moment(late_
     moved = late_ms / 1e3 * np.array([2.0, -1.0, 0.0])
     there = pymap3d.ned2geodetic(*(moved + np.array([north, east, down])), 41.1512, -81.4161, 320.5)
     at = position(boot_ms=5000, place=(north, east, down), velocity=(2.0, -1.0, 0.0))
-    swarm = observe(FLEET, [at, place(*there, 5000 + late_ms)])
+    swarm = observe(FLEET, [beat(ARDUPILOT), at, place(*there, 5000 + late_ms)])
     back = pymap3d.geodetic2ned(*swarm.origin[1], 41.1512, -81.4161, 320.5)
     assert back == pytest.approx((0, 0, 0), abs=0.02)  # 1e-7 degrees are 1 cm
 
 
 @pytest.mark.parametrize("late_ms", [-251, 251, 10_000])
 def test_reports_of_different_moments_tell_nothing_of_the_origin(late_ms):
-    swarm = observe(FLEET, [position(boot_ms=20_000), place(41.0, -81.0, 320.0, 20_000 + late_ms)])
-    assert np.isnan(swarm.origin).all()
+    heard = [beat(ARDUPILOT), position(boot_ms=20_000), place(41.0, -81.0, 320.0, 20_000 + late_ms)]
+    assert np.isnan(observe(FLEET, heard).origin).all()
 
 
-def test_nor_does_a_place_alone():
-    assert np.isnan(observe(FLEET, [place(41.0, -81.0, 320.0, 1000)]).origin).all()
+@pytest.mark.parametrize(
+    "heard",
+    [
+        [beat(ARDUPILOT), place(41.0, -81.0, 320.0, 1000)],
+        [position(), place(41.0, -81.0, 320.0, 1000)],
+        [beat(ARDUPILOT), position(), place(41.0, -81.0, 320.0, 1000, time_ns=LATER - 1)],
+    ],
+    ids=["without a local position", "before the first heartbeat", "while it may still be told"],
+)
+def test_nor_does_a_place_alone_or_one_that_comes_too_early(heard):
+    assert np.isnan(observe(FLEET, heard).origin).all()
 
 
 def test_an_origin_that_is_told_stands():
-    told, derived = origin(320_500), place(41.0, -81.0, 300.0, 1000)
-    for heard in ([position(), told, derived], [position(), derived, told]):
-        assert observe(FLEET, heard).origin[1].tolist() == [0, 0, 320.5]
+    known, told, derived = [beat(ARDUPILOT), position()], origin(320_500), place(41.0, -81.0, 300.0, 1000)
+    for heard in ([told, derived], [derived, told]):
+        assert observe(FLEET, known + heard).origin[1].tolist() == [0, 0, 320.5]
 
 
 # --- accuracy
