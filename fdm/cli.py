@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import math
+import re
 import signal
 import sys
-from typing import Annotated, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, CycloptsError, Parameter
+
+if TYPE_CHECKING:
+    from wire.connection import Connection
+    from wire.signing import Signer
 
 
 def _version() -> str:
@@ -26,20 +32,34 @@ def serve(
     *,
     to: str = "udpout:127.0.0.1:14550",
     ports: Literal["shared", "separate"] = "shared",
+    autopilot: Literal["px4", "ardupilot"] = "px4",
+    stock_failsafes: Annotated[bool, Parameter(negative=())] = False,
+    signing_key: Path | None = None,
+    no_fault: Annotated[bool, Parameter(negative=())] = False,
     speed: float = 1.0,
     seed: int = 1,
     set_: Annotated[tuple[str, ...], Parameter(name="--set", negative=(), show_default=False)] = (),
 ) -> int:
-    """Serve the vehicles of a scenario over UDP until Ctrl-C.
+    """Serve the vehicles of a scenario until Ctrl-C, over UDP, TCP or a serial line.
 
     Parameters
     ----------
     scenario
         A scenario's name (see `gcs scenarios`), or the path of a TOML file.
     to
-        Where the vehicles send: udpout:HOST:PORT; or where they wait to be spoken to: udpin:HOST:PORT.
+        Where the vehicles send: udpout:HOST:PORT, tcp:HOST:PORT, serial:DEVICE:SPEED; or where they wait to be
+        spoken to: udpin:HOST:PORT, tcpin:HOST:PORT.
     ports
         shared: all to that port. separate: vehicle i to PORT + i - 1.
+    autopilot
+        What the vehicles are taken for: its modes, messages, parameters and failsafes.
+    stock_failsafes
+        With the autopilot's own failsafe parameters; ours stop after 0.5 s of silence and land.
+    signing_key
+        A file with the key, 64 hex digits or a passphrase: what the vehicles say is signed, and they obey nothing
+        that is not.
+    no_fault
+        Everything healthy, whatever the scenario says.
     speed
         Simulated seconds a second.
     seed
@@ -51,6 +71,7 @@ def serve(
     from fdm.world import World
     from scenarios import ScenarioError, load
     from wire.connection import ConnectionRefused, parse
+    from wire.signing import SigningKeyError
 
     if not 0.0 < speed < math.inf:
         return _refuse(f"--speed {speed}: must be a number above 0")
@@ -61,11 +82,18 @@ def serve(
         connections = parse(to)
         if len(connections) > 1:
             return _refuse(f"--to {to}: one port; with --ports separate the others follow it")
-        last = connections[0].port + loaded.swarm.count - 1
-        if ports == "separate" and last > 65535:
-            return _refuse(f"--to {to}: {loaded.swarm.count} vehicles would need ports up to {last}, beyond 65535")
-        server = Server(World(loaded, seed=seed), connections[0], ports=ports, speed=speed)
-    except (ScenarioError, ConnectionRefused) as error:
+        trouble = _no_room(connections[0], ports, loaded.swarm.count)
+        if trouble:
+            return _refuse(f"--to {to}: {trouble}")
+        world = World(
+            loaded.without_faults() if no_fault else loaded,
+            seed=seed,
+            autopilot=autopilot,
+            stock_failsafes=stock_failsafes,
+        )
+        signer = _signer(signing_key, connections[0])
+        server = Server(world, connections[0], ports=ports, speed=speed, signer=signer)
+    except (ScenarioError, ConnectionRefused, SigningKeyError) as error:
         return _refuse(str(error))
     stopped = False
 
@@ -75,8 +103,10 @@ def serve(
 
     signal.signal(signal.SIGINT, stop)
     signal.signal(signal.SIGTERM, stop)
-    where = f"send to {connections[0]}" if connections[0].kind == "udpout" else f"wait at {connections[0]}"
-    _say(f"{loaded.swarm.count} vehicles {where} ({ports} ports, speed {speed:g}); Ctrl-C stops")
+    _say(
+        f"{loaded.swarm.count} vehicles {_where(connections[0])} ({autopilot}, {ports} ports, speed {speed:g}); "
+        "Ctrl-C stops"
+    )
     warned = False
     while not stopped:
         server.turn()
@@ -84,8 +114,35 @@ def serve(
             warned = True
             _say(f"this machine is too slow for --speed {speed:g}: the simulation lags {server.behind_s:.1f} s")
     server.close()
+    if signer is not None:
+        signer.save()
     _say("stopped")
     return 0
+
+
+def _no_room(to: Connection, ports: str, count: int) -> str:
+    """Why vehicles cannot have a port each; empty where they can, or need not."""
+    if ports == "shared":
+        return ""
+    if to.kind == "serial":
+        return "a serial line is one; all vehicles share it"
+    last = to.port + count - 1
+    return f"{count} vehicles would need ports up to {last}, beyond 65535" if last > 65535 else ""
+
+
+def _signer(key: Path | None, to: Connection) -> Signer | None:
+    """Its memory lies beside the key, one for each link: what was said before a restart cannot be said again."""
+    from wire.signing import Signer, read_key
+
+    if key is None:
+        return None
+    place = re.sub(r"[^\w.]+", "-", str(to))
+    return Signer(read_key(key), memory=key.with_name(f"{key.name}.vehicles-{place}"))
+
+
+def _where(to: Connection) -> str:
+    waits = to.kind in ("udpin", "tcpin")
+    return f"wait at {to}" if waits else f"send to {to}"
 
 
 def _refuse(words: str) -> int:

@@ -8,9 +8,13 @@ import sys
 import time
 
 import pytest
-from clients import Station
+from clients import REQUEST, VERSION, Station, command
 
 from fdm.cli import app
+from scenarios import load
+from wire.connection import ConnectionRefused
+from wire.frames import Framer, decode
+from wire.signing import Signer, read_key
 
 FDM = [sys.executable, "-c", "from fdm.cli import main; main()"]
 
@@ -57,7 +61,7 @@ def test_serve_flies_until_it_is_told_to_stop(stop):
             process.wait()
     assert process.returncode == 0
     assert out == ""
-    assert words.splitlines() == [f"6 vehicles send to {to} (shared ports, speed 2); Ctrl-C stops", "stopped"]
+    assert words.splitlines() == [f"6 vehicles send to {to} (px4, shared ports, speed 2); Ctrl-C stops", "stopped"]
 
 
 @pytest.mark.parametrize(
@@ -65,7 +69,10 @@ def test_serve_flies_until_it_is_told_to_stop(stop):
     [
         (["nope"], ["nope", "demo, emergency, transit"]),
         (["demo", "--to", "hello"], ["'hello'", "udpout:127.0.0.1:14550"]),
-        (["demo", "--to", "tcp:127.0.0.1:14550"], ["tcp", "udpout"]),
+        (["demo", "--to", "ipx:127.0.0.1:14550"], ["ipx", "udpout"]),
+        (["demo", "--to", "serial:/dev/ttyUSB0:57600", "--ports", "separate"], ["a serial line is one"]),
+        (["demo", "--to", "serial:/dev/no-such-line:57600"], ["/dev/no-such-line"]),
+        (["demo", "--signing-key", "/no/such/key"], ["/no/such/key"]),
         (["demo", "--to", "udpout:127.0.0.1:0"], ["ports must be 1 to 65535"]),
         (["demo", "--to", "udpout:127.0.0.1:14550-14555"], ["one port"]),
         (["demo", "--to", "udpout:127.0.0.1:65533", "--ports", "separate"], ["65538"]),
@@ -99,7 +106,14 @@ def test_a_port_in_use_is_refused_with_one_sentence_and_code_2(run):
 
 @pytest.mark.parametrize(
     "arguments",
-    [["serve"], ["fly"], ["serve", "demo", "--speed", "abc"], ["serve", "demo", "--bogus"], ["serve", "a", "b"]],
+    [
+        ["serve"],
+        ["fly"],
+        ["serve", "demo", "--speed", "abc"],
+        ["serve", "demo", "--bogus"],
+        ["serve", "a", "b"],
+        ["serve", "demo", "--autopilot", "paparazzi"],
+    ],
 )
 def test_what_is_no_command_ends_with_code_2_and_words(run, arguments):
     code, out, said = run(*arguments)
@@ -110,5 +124,69 @@ def test_what_is_no_command_ends_with_code_2_and_words(run, arguments):
 def test_help_names_every_option(run):
     code, out, _ = run("serve", "--help")
     assert code == 0
-    for option in ("--to", "--ports", "--speed", "--seed", "--set"):
+    for option in ("--to", "--ports", "--autopilot", "--stock-failsafes", "--signing-key", "--no-fault", "--speed"):
         assert option in out
+    for option in ("--seed", "--set"):
+        assert option in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ([], {"seed": 1, "autopilot": "px4", "stock_failsafes": False}),
+        (["--autopilot", "ardupilot", "--seed", "7"], {"seed": 7, "autopilot": "ardupilot", "stock_failsafes": False}),
+        (["--stock-failsafes"], {"seed": 1, "autopilot": "px4", "stock_failsafes": True}),
+    ],
+)
+def test_what_is_asked_for_is_what_is_built(run, monkeypatch, arguments, told):
+    built = []
+
+    def build(scenario, **options):
+        built.append((scenario.title, options))
+        raise ConnectionRefused("that is all")
+
+    monkeypatch.setattr("fdm.world.World", build)
+    assert run("serve", "emergency", *arguments)[0] == 2
+    assert built == [(load("emergency").title, told)]
+
+
+@pytest.mark.parametrize(("arguments", "faults"), [([], 1), (["--no-fault"], 0)])
+def test_everything_is_healthy_where_that_is_asked_for(run, monkeypatch, arguments, faults):
+    seen = []
+
+    def build(scenario, **_options):
+        seen.append(len(scenario.fault))
+        raise ConnectionRefused("that is all")
+
+    monkeypatch.setattr("fdm.world.World", build)
+    run("serve", "emergency", *arguments)
+    assert seen == [faults]
+
+
+@pytest.mark.wall_clock
+def test_with_a_key_the_vehicles_sign_and_obey_nobody_without_it(tmp_path):
+    key = tmp_path / "swarm.key"
+    key.write_text("correct horse battery staple\n")
+    station, signer = Station(), Signer(read_key(key))
+    with listening() as (udp, to):
+        arguments = ["serve", "demo", "--to", to, "--autopilot", "ardupilot", "--signing-key", str(key)]
+        process = subprocess.Popen([*FDM, *arguments], stderr=subprocess.DEVNULL)
+        try:
+            deadline = time.monotonic() + 8.0
+            asked, answered = False, []
+            while not answered and time.monotonic() < deadline:
+                data, sender = udp.recvfrom(2048)
+                assert data[2] == 1, "every frame is signed"
+                for frame in Framer().frames(0, data):
+                    assert signer.refusal(frame) is None
+                    answered += [decode(frame)] if frame.message == VERSION else []
+                if not asked:
+                    asked = True
+                    udp.sendto(station.pack(command(REQUEST, VERSION, system=2)), sender)
+                    udp.sendto(signer.sign(station.pack(command(REQUEST, VERSION, system=3))), sender)
+            assert [message.get_srcSystem() for message in answered] == [3]
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait(timeout=4.0)
+    assert process.returncode == 0
+    assert len(list(tmp_path.glob("swarm.key.vehicles-*"))) == 1
