@@ -25,8 +25,6 @@ class Surroundings:
     def __init__(self, scenario: Scenario, *, vehicle: int, seed: int) -> None:
         self.sensors = Sensors(scenario, vehicle=vehicle, seed=seed)
         """What the vehicle tells of itself."""
-        self.noise = scenario.noise
-        """What blurs it."""
         self._scenario, self._system, self._seed = scenario, vehicle, seed
         self._faults = VehicleFaults(scenario.fault, vehicle=vehicle, cruise=scenario.mission.cruise_m_s)
         self._wind = _steady(scenario, vehicle)
