@@ -11,6 +11,7 @@ HOLD = "hold"
 """End the mission, and stay where you are until somebody says land."""
 
 _TAKE_BACK = re.compile(r"take back (\d+)")
+_KILL = re.compile(r"kill (\d+)")
 
 
 def take_back(system: int) -> str:
@@ -21,6 +22,17 @@ def take_back(system: int) -> str:
 def taken_back(event: Event) -> int | None:
     """The system id that an event takes back, if it is such a word."""
     match = _TAKE_BACK.fullmatch(event) if isinstance(event, str) else None
+    return int(match[1]) if match else None
+
+
+def kill(system: int) -> str:
+    """The word with which the operator stops a vehicle's rotors at once, in the air too."""
+    return f"kill {system}"
+
+
+def killed(event: Event) -> int | None:
+    """The system id that an event kills, if it is such a word."""
+    match = _KILL.fullmatch(event) if isinstance(event, str) else None
     return int(match[1]) if match else None
 
 
@@ -38,4 +50,4 @@ class Rating:
 
 
 Event = str | Rating
-"""A word of the operator (LAND, HOLD, take_back), or a rating."""
+"""A word of the operator (LAND, HOLD, take_back, kill), or a rating."""

@@ -125,7 +125,16 @@ def fly_and_record(
     link = Counting(world if through is None else through(world, world))
     operator = Saying(events)
     summary = flown(
-        name, scenario, link, world, seed=seed, out=folder, operator=operator, watching=watching, ratings=ratings
+        name,
+        scenario,
+        link,
+        world,
+        seed=seed,
+        out=folder,
+        operator=operator,
+        watching=watching,
+        ratings=ratings,
+        say=lambda _words: None,
     )
     return Recorded(scenario, summary, folder, link)
 

@@ -13,10 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gcs.events import LAND, Rating
-from gcs.inlet import BUFFER, CLIENTS, HOST, LINE, LINES_A_TICK, Conversation, Inlet
+from gcs.inlet import HOST, Inlet
+from gcs.lines import BUFFER, CLIENTS, LINE, LINES_A_TICK, Conversation
 from gcs.lockstep import Lockstep
 from gcs.operator import Operator
-from gcs.ratings import RatingsError, written
+from gcs.ratings import RatingsError, parse, written
 from gcs.replay import decide_again
 from gcs.session import flown
 from scenarios import load
@@ -28,6 +29,11 @@ def line(rating):
     return written(rating) + b"\n"
 
 
+def conversation():
+    """With one who rates six vehicles."""
+    return Conversation(lambda line: parse(line, count=6, live=True))
+
+
 def answers(talk):
     """What it has to say, taken off its hands."""
     data = talk.data_to_send()
@@ -37,7 +43,7 @@ def answers(talk):
 
 @pytest.fixture
 def talk():
-    return Conversation(count=6)
+    return conversation()
 
 
 # --- bytes in, bytes out
@@ -55,7 +61,7 @@ def test_a_rating_counts_at_the_tick_that_the_answer_names(talk):
 def test_it_does_not_matter_where_the_bytes_are_cut(ratings, data):
     stream = b"".join(map(line, ratings))
     cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=5)))
-    talk, heard = Conversation(count=6), []
+    talk, heard = conversation(), []
     for begin, end in zip([0, *cuts], [*cuts, len(stream)], strict=True):
         talk.receive(stream[begin:end])
         heard += talk.step(7)
@@ -125,7 +131,7 @@ def test_a_last_line_may_lack_its_end_but_not_a_part_of_itself(talk):
     assert not talk.over
     assert answers(talk) == [{"tick": 1}]
     assert talk.over
-    cut = Conversation(count=6)
+    cut = conversation()
     cut.receive(written(GOOD)[:-1])
     cut.end()
     assert cut.step(0) == []
@@ -143,7 +149,7 @@ def test_a_web_page_that_posts_a_rating_is_not_heard_however_long_the_path(talk,
 
 @given(st.lists(st.binary(max_size=200), max_size=30), st.booleans())
 def test_garbage_never_raises_counts_or_grows(chunks, reading):
-    talk = Conversation(count=6)
+    talk = conversation()
     for tick, chunk in enumerate(chunks):
         talk.receive(chunk[: talk.room])
         assert talk.step(tick) == []
@@ -163,7 +169,7 @@ class Ticked:
 
     @property
     def talks(self):
-        return [talk for _, talk in self.inlet._clients]
+        return [talk for _, talk in self.inlet._lines._clients]
 
     def until(self, enough, *, within_s=5.0):
         """Tick until what was taken is enough: (tick, rating) of each. Loopback delivers when it likes."""
@@ -272,7 +278,7 @@ def _readable(connection):
 
 
 def test_it_listens_on_this_machine_only(inlet):
-    assert inlet.inlet._listener.getsockname()[0] == "127.0.0.1"
+    assert inlet.inlet._lines._listener.getsockname()[0] == "127.0.0.1"
 
 
 def test_a_port_that_somebody_has_is_refused(inlet):
@@ -333,7 +339,7 @@ def test_live_ratings_are_recorded_at_the_tick_they_were_answered_with_and_the_f
             ratings=(),
         )
         one.shutdown(socket.SHUT_WR)
-        Ticked(inlet).until(lambda _: not inlet._clients)
+        Ticked(inlet).until(lambda _: not inlet._lines._clients)
         answered = [orjson.loads(answer)["tick"] for answer in one.makefile("rb")]
     recorded = [orjson.loads(data) for topic, _, data in messages(folder / "run.mcap") if topic == "/ratings"]
     assert [rating["tick"] for rating in recorded] == answered
