@@ -1,6 +1,8 @@
 """Every message of a vehicle, read by pymavlink and held against the truth."""
 
+import itertools
 import math
+import random
 
 import numpy as np
 import pymap3d
@@ -15,14 +17,16 @@ from fdm.position_reports import MEASUREMENTS
 from fdm.sensors import BLUR_S, Sensors
 from fdm.telemetry import Reporter
 from fdm.vehicle import Geodetic, Vehicle
-from scenarios import Scenario
+from fdm.world import World
 from scenarios.models import Noise
+from tests.fdm.clients import ACCEPTED, ARM, LAND, MODE, REQUEST, SET_INTERVAL, TAKE_OFF, Station, command, scenario
+from wire.parameters import decode
 
 PLACE = Geodetic(47.3977, 8.5456, 488.0)
 HZ = 250
 HEARTBEAT, SYS_STATUS, SYSTEM_TIME, GPS_RAW, ATTITUDE, QUATERNION = 0, 1, 2, 24, 30, 31
 LOCAL, GLOBAL, ORIGIN, HUD, TARGET, VERSION, BATTERY, HOME, EXTENDED = 32, 33, 49, 74, 85, 148, 147, 242, 245
-EKF, ESTIMATOR = 193, 230
+EKF, ESTIMATOR, ACK = 193, 230, 77
 ALL = (HEARTBEAT, SYS_STATUS, SYSTEM_TIME, GPS_RAW, ATTITUDE, QUATERNION, LOCAL, GLOBAL, ORIGIN, HUD, TARGET, VERSION)
 ALL += (BATTERY, HOME, EXTENDED)
 OWN = {"px4": ESTIMATOR, "ardupilot": EKF}
@@ -299,15 +303,13 @@ def test_px4_says_its_accuracy_in_metres_too():
 
 
 def test_the_accuracy_it_claims_is_the_root_mean_square_of_its_errors():
-    told = {"title": "t", "swarm": {"rows": 1, "columns": 1, "leaders": [1]}, "noise": {"position_m": 0.7}}
-    told["mission"] = {"cruise_m_s": 1.5, "leg": [{"task": "north", "heading_deg": 0, "length_m": 30}]}
-    scenario = Scenario.model_validate(told)
-    sensors = Sensors(scenario, vehicle=1, seed=1)
+    told = scenario(noise={"position_m": 0.7})
+    sensors = Sensors(told, vehicle=1, seed=1)
     sensors.begin(0.0)
     still = (0.0,) * 6
     errors = np.array([sensors.measured(still, (n + 0.5) * BLUR_S)[:2] for n in range(5000)])
     rms = math.sqrt((errors**2).sum(axis=1).mean())
-    assert Rig(noise=scenario.noise).say(GPS_RAW).h_acc / 1000 == pytest.approx(rms, rel=0.04)
+    assert Rig(noise=told.noise).say(GPS_RAW).h_acc / 1000 == pytest.approx(rms, rel=0.04)
 
 
 STEERED = {"px4": Mode.OFFBOARD, "ardupilot": Mode.GUIDED}
@@ -400,3 +402,82 @@ def test_two_long_texts_have_different_numbers():
 def test_an_acknowledgement_goes_to_who_asked():
     told = heard(Rig().reporter.acknowledge(400, 4, to_system=254, to_component=191))
     assert (told.command, told.result, told.target_system, told.target_component) == (400, 4, 254, 191)
+
+
+class Wired(Station):
+    """A ground station beside one vehicle of a world."""
+
+    def __init__(self, name):
+        super().__init__()
+        self.world = World(scenario(), autopilot=name)
+
+    def send(self, *messages):
+        self.world.deliver(1, b"".join(map(self.pack, messages)))
+        return self.wait(0.0)
+
+    def wait(self, seconds):
+        """What was heard of the autopilot meanwhile."""
+        before = len(self.heard)
+        self.world.step(round(seconds * self.world.physics_hz))
+        for step, _, frame in self.world.collect():
+            self.read(frame, step)
+        return [message for _, message in self.heard[before:] if message.get_srcComponent() == 1]
+
+
+@both
+def test_every_message_comes_as_often_as_asked_and_once_on_request(name):
+    station = Wired(name)
+    wanted = (*ALL, OWN[name])
+    for message in wanted:
+        (ack,) = station.send(command(SET_INTERVAL, message, 100_000))
+        assert ack.result == ACCEPTED
+    station.wait(0.2)
+    kinds = [message.get_msgId() for message in station.wait(2.0)]
+    assert {kind: kinds.count(kind) for kind in wanted} == dict.fromkeys(wanted, 20)
+    for message in wanted:
+        assert [told.get_msgId() for told in station.send(command(REQUEST, message))] == [message, ACK]
+        station.send(command(SET_INTERVAL, message, -1))
+    assert station.wait(3.0) == []
+
+
+def test_unasked_arducopter_only_beats_and_px4_tells_slowly_what_a_person_needs():
+    beats = [message.get_type() for message in Wired("ardupilot").wait(4.0)]
+    assert beats == ["HEARTBEAT"] * 4
+    told = [message.get_msgId() for message in Wired("px4").wait(4.0)]
+    each_second = {HEARTBEAT, SYS_STATUS, EXTENDED, ATTITUDE, LOCAL, GLOBAL}
+    assert {kind: told.count(kind) for kind in set(told)} == dict.fromkeys(each_second, 4) | {BATTERY: 2}
+
+
+@both
+def test_a_client_on_a_lossy_link_gets_all_parameters_by_list_and_by_index(name):
+    station, lost = Wired(name), random.Random(1)
+    station.send(dialect.MAVLink_param_request_list_message(1, 1))
+    values = [m for m in station.wait(2.0) if m.get_type() == "PARAM_VALUE"]
+    got = {m.param_index: m for m in values if lost.random() > 0.2}
+    assert len(got) < values[0].param_count == len(values)
+    while missing := set(range(values[0].param_count)) - set(got):
+        for index in missing:
+            (value,) = station.send(dialect.MAVLink_param_request_read_message(1, 1, b"", index))
+            if lost.random() > 0.2:
+                got[value.param_index] = value
+    table = station.world.endpoints[0].parameters
+    autopilot = PERSONALITIES[name].autopilot
+    read = {m.param_id: decode(m.param_value, m.param_type, autopilot) for m in got.values()}
+    assert read == {parameter.name: parameter.value for parameter in table}
+
+
+@both
+def test_a_flight_is_seen_on_the_ground_taking_off_in_the_air_landing_and_on_the_ground(name):
+    station = Wired(name)
+    station.send(command(SET_INTERVAL, EXTENDED, 100_000))
+    station.wait(3.5)
+    height = 3.0 if name == "ardupilot" else 3.0 + station.world.endpoints[0].vehicle.state().altitude_m
+    if name == "ardupilot":
+        station.send(command(MODE, 1, 4))
+    station.send(command(ARM, 1), command(TAKE_OFF, 0, 0, 0, 0, 0, 0, height))
+    station.wait(6.0)
+    station.send(command(LAND))
+    station.wait(12.0)
+    states = [message.landed_state for message in station.all("EXTENDED_SYS_STATE")]
+    assert [state for state, _ in itertools.groupby(states)] == [1, 3, 2, 4, 1]
+    assert not station.last("HEARTBEAT").base_mode & 128
