@@ -4,15 +4,28 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
+from typing import NamedTuple
 
 from gcs.link_quality import LinkQuality, Meter
-from gcs.routes import Routes
+from gcs.messages import HEARTBEAT
+from gcs.routes import Routes, of_station
 from wire.clock import WallClock
 from wire.connection import Connection
 from wire.frames import Frame
 from wire.hub import Hub, Peer
 from wire.ids import AUTOPILOT
 from wire.signing import Signer
+
+STATIONS_AT_MOST = 16
+"""Other ground stations that are remembered."""
+
+
+class Station(NamedTuple):
+    """Another ground station."""
+
+    system: int
+    component: int
+    address: str
 
 
 class Live:
@@ -36,6 +49,7 @@ class Live:
         self._meters: dict[int, Meter] = {}
         self._frames: list[Frame] = []
         self._refused: Counter[str] = Counter()
+        self._stations: dict[tuple[int, int], Station] = {}
 
     def now(self) -> int:
         """ns since 1970."""
@@ -87,11 +101,23 @@ class Live:
         return self._routes.duplicates(self.now())
 
     @property
+    def stations(self) -> tuple[Station, ...]:
+        """Other ground stations whose heartbeats came this way."""
+        return tuple(self._stations.values())
+
+    def address(self, system: int) -> str | None:
+        """Where a vehicle speaks from; None before it was heard."""
+        peer = self._routes.peer(system)
+        return None if peer is None else _place(peer)
+
+    @property
     def quality(self) -> Mapping[int, LinkQuality]:
         """System id → how well its autopilot is heard."""
         return {system: meter.quality for system, meter in self._meters.items()}
 
     def _take(self, peer: Peer, frame: Frame) -> None:
+        if frame.message == HEARTBEAT and of_station(frame):
+            self._note(Station(frame.system, frame.component, _place(peer)))
         spoke = self._routes.peer(frame.system)
         refusal = self._routes.refusal(frame, peer)
         if refusal is not None:
@@ -105,3 +131,12 @@ class Live:
         if frame.component == AUTOPILOT:
             self._meters[frame.system].count(frame)
         self._frames.append(frame)
+
+    def _note(self, station: Station) -> None:
+        name = (station.system, station.component)
+        if name in self._stations or len(self._stations) < STATIONS_AT_MOST:
+            self._stations[name] = station
+
+
+def _place(peer: Peer) -> str:
+    return str(peer.port.connection) if peer.address is None else f"{peer.address[0]}:{peer.address[1]}"

@@ -104,3 +104,8 @@ def introduces(frame: Frame) -> bool:
         return False
     kind, autopilot = frame.payload[4:6]
     return kind not in NO_VEHICLES and autopilot != dialect.MAV_AUTOPILOT_INVALID
+
+
+def of_station(frame: Frame) -> bool:
+    """Whether this heartbeat is a ground station's."""
+    return len(frame.payload) >= 5 and frame.payload[4] == dialect.MAV_TYPE_GCS

@@ -61,7 +61,7 @@ def flown(
     with ExitStack() as stack:
         recorder = Recorder(out / RECORDING, scenario, truth, start_ns=start_ns, metadata=metadata, say=say)
         last_resort = LastResort(link, clock, flight.ids, say)
-        records = (
+        records: tuple[tuple[str, Record], ...] = (
             ("the last resort", last_resort),
             ("the truth", truth),
             ("the track", tracker),
