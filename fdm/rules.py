@@ -107,12 +107,12 @@ def _ardupilot(told: Parameters) -> Rules:
 
 
 _PX4_SETPOINTS = {
-    **dict.fromkeys((0, 1, 2), Action.HOLD),  # a pilot's modes, which fall back to Hold where there are no sticks
+    **dict.fromkeys((0, 1, 2), Action.RETURN),  # a pilot's modes, which cannot run without sticks: PX4 returns instead
     3: Action.RETURN,
     4: Action.LAND,
     5: Action.HOLD,
 }
-"""COM_OBL_RC_ACT. https://docs.px4.io/main/en/flight_modes/offboard.html"""
+"""COM_OBL_RC_ACT. https://docs.px4.io/main/en/flight_modes/offboard.html, and for want of sticks PX4's failsafe.cpp."""
 _PX4_STATION = {0: Action.NOTHING, 1: Action.HOLD, 2: Action.RETURN, 3: Action.LAND}
 """NAV_DLL_ACT."""
 _ARDUPILOT_STATION = {0: Action.NOTHING, 1: Action.RETURN, 5: Action.LAND}

@@ -181,9 +181,9 @@ def test_our_px4_holds_half_a_second_after_the_last_set_point_and_lands_five_lat
     assert (told.level_m_s, told.climb_m_s, told.descent_m_s) == (12.0, 3.0, 1.5)
 
 
-def test_stock_px4_holds_after_a_second_and_never_misses_its_ground_station():
+def test_stock_px4_holds_after_a_second_then_returns_and_never_misses_its_ground_station():
     told = rules(table("px4", stock=True))
-    assert (told.setpoint_silence_s, told.after_setpoints) == (1.0, Action.HOLD)
+    assert (told.setpoint_silence_s, told.after_setpoints) == (1.0, Action.RETURN)
     assert (told.station_silence_s, told.after_station) == (math.inf, Action.NOTHING)
 
 
@@ -211,7 +211,14 @@ def test_never_is_written_in_each_autopilots_own_way():
 
 @pytest.mark.parametrize(
     ("code", "action"),
-    [(0, Action.HOLD), (1, Action.HOLD), (2, Action.HOLD), (3, Action.RETURN), (4, Action.LAND), (5, Action.HOLD)],
+    [
+        (0, Action.RETURN),
+        (1, Action.RETURN),
+        (2, Action.RETURN),
+        (3, Action.RETURN),
+        (4, Action.LAND),
+        (5, Action.HOLD),
+    ],
 )
 def test_each_code_of_lost_set_points_is_an_action(code, action):
     px4 = table("px4")
