@@ -13,33 +13,26 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from gcs import leaving, losses, mission
+from gcs import leaving, losses, mission, preflight
 from gcs.autopilots import Fleet
 from gcs.beliefs import Beliefs, Seen
-from gcs.commands import Beat, Command
+from gcs.commands import Beat, Command, Kill
 from gcs.control import settings
-from gcs.events import LAND, Event, Rating
-from gcs.flight_state import (
-    BEFORE_MISSION,
-    Asked,
-    Diagnosis,
-    FlightState,
-    Phase,
-    abandoned,
-    entered,
-    failed,
-)
-from gcs.gate import LOST_NS, Limits, Standing, admit
+from gcs.events import Event, Rating
+from gcs.flight_state import Asked, Commands, Diagnosis, FlightState, Phase, Step, abandoned, entered, failed
+from gcs.gate import LOST_NS
+from gcs.hands import Hands
 from gcs.rules import RuleError
+from gcs.steering import Steering
 from gcs.swarm_frame import swarm_frame
-from gcs.telemetry import Swarm
+from gcs.telemetry import Flags, Swarm
+from gcs.watch import Watch
 from scenarios import Scenario, offsets_ne
 from trustr.controller import Decision, Observation, decide
-from trustr.leader import VirtualLeader, capped
+from trustr.leader import capped
 from trustr.roles import taken_back
 
 Array = npt.NDArray[np.float64]
-Commands = list[tuple[int, Command]]
 
 STALE_NS = 300_000_000
 """Age of telemetry from which a vehicle has weight 0."""
@@ -47,21 +40,14 @@ RETRY_S = 1.0
 """Between two askings for the same thing."""
 JOIN_S = 60.0
 """All vehicles must be heard and ready by then."""
-LANDING_S = 90.0
-"""All vehicles must have landed by then."""
 STREAM_FIRST_S = 1.0
 """Set-points flow this long before we ask for OFFBOARD."""
 STILL, LEVEL = 0.15, 0.2
 """m/s and m: the fleet hovers in formation, and the run-up may begin."""
-HEIGHT_GAIN, CLIMB_SPEED = 0.8, 1.0
-"""1/s and m/s: altitude is held apart from the consensus."""
 TOLD_S = 2.0
 """A heartbeat is a second apart: what it says is believed this long after it may have changed."""
 RUN_UP_GAIN, RUN_UP_CAP = 0.5, 0.5
 """1/s and m/s: every robot to its place beside the moving origin."""
-
-
-Step = tuple[FlightState, Commands, Diagnosis]
 
 
 class Flight:
@@ -80,15 +66,18 @@ class Flight:
         self._leader = mission.PROFILES[scenario.control.profile]
         position_s = scenario.time.period_s / (scenario.time.positions_per_tick or 1)
         self._fleet = Fleet(height_m=scenario.swarm.altitude_m, position_s=position_s)
-        self._limits = Limits.of(scenario)
         self._period_s = scenario.time.period_s
         self._run_up_ticks = scenario.time.ticks(scenario.mission.run_up_s)
+        take_off_ne = -self._run_up_m(self._run_up_ticks) * self._ahead
+        self._steering = Steering(scenario, self.plan, self._fleet, centre_ne=take_off_ne)
+        self._watch = Watch(scenario, self._fleet, centre_ne=take_off_ne)
         self._phases: dict[Phase, Callable[[FlightState, Swarm, int], Step]] = {
             Phase.JOIN: self._join,
             Phase.CLIMB: self._climb,
             Phase.TAKE_CONTROL: self._take_control,
             Phase.RUN_UP: self._run_up,
             Phase.MISSION: self._mission,
+            Phase.HOLD: self._hold,
             Phase.LAND: self._land,
             Phase.DONE: self._land,
         }
@@ -103,19 +92,23 @@ class Flight:
             asked=(Asked(),) * n,
             sent_ned=np.zeros((n, 3)),
             belief=self._beliefs.start(),
+            hands=Hands.of(n),
         )
 
     def __call__(self, state: FlightState, swarm: Swarm, events: Iterable[Event], now_ns: int) -> Step:
-        """One tick. events: what people said since the last; LAND ends the flight."""
-        if LAND in events and state.phase not in (Phase.LAND, Phase.DONE):
-            state = abandoned(state)
+        """One tick. events: what people said since the last; `gcs.events` has their words."""
+        events = tuple(events)
+        state = replace(state, start_ns=now_ns if state.start_ns is None else state.start_ns)
+        state = self._watch.heed(state, swarm, events, now_ns)
         state = self._watch(state, swarm, now_ns)
         said = (*self._due(state), *(event for event in events if isinstance(event, Rating)))
         state = self._believe(state, swarm, said, now_ns)
+        state, kills = self._kill(state, swarm)
         state, commands, diagnosis = self._phases[state.phase](state, swarm, now_ns)
         if state.tick % self.scenario.time.ticks(1.0) == 0:
-            commands = [(system, Beat()) for system in self.ids] + commands
-        return replace(state, tick=state.tick + 1), commands, replace(diagnosis, ratings=said)
+            commands = commands + [(system, Beat()) for system in self.ids]
+        state = replace(state, tick=state.tick + 1, now_ns=now_ns)
+        return state, kills + commands, replace(diagnosis, ratings=said)
 
     def _due(self, state: FlightState) -> tuple[Rating, ...]:
         """Ratings known beforehand that count at this tick."""
@@ -131,10 +124,10 @@ class Flight:
         seen = Seen(
             mission_s=self._mission_s(state),
             commanded_ne=state.sent_ned[:, :2],
-            position_ne=self._position_ne(state, swarm),
+            position_ne=state.position_ne(swarm),
             velocity_ne=swarm.velocity_ned[:, :2],
             position_ns=swarm.position_ns,
-            heard=self._fleet.obeying(swarm) & swarm.fresh(now_ns, within_ns=STALE_NS),
+            heard=self._obeying(state, swarm) & swarm.fresh(now_ns, within_ns=STALE_NS),
             left=state.memory.roles.left if state.memory else np.zeros(len(swarm.ids), bool),
             ratings=said,
         )
@@ -147,35 +140,29 @@ class Flight:
         memory = replace(state.memory, roles=taken_back(state.memory.roles, wanted))
         return replace(state, memory=memory, belief=self._beliefs.forgive(state.belief, wanted))
 
-    def _watch(self, state: FlightState, swarm: Swarm, now_ns: int) -> FlightState:
-        """Give up what takes too long, and a fleet that loses a vehicle before its mission."""
-        timeout_s = self.scenario.time.timeout_s
-        in_phase_s = (state.tick - state.phase_tick) * self._period_s
-        if state.phase is Phase.LAND:
-            if in_phase_s > LANDING_S:
-                return failed(state, f"not every vehicle landed within {LANDING_S:g} s", Phase.DONE)
-        elif state.tick * self._period_s > timeout_s and state.phase is not Phase.DONE:
-            problem = f"the flight took longer than time.timeout_s = {timeout_s:g} s"
-            return failed(abandoned(state), problem, Phase.LAND)
-        elif state.phase in BEFORE_MISSION:
-            silent = ~swarm.fresh(now_ns, within_ns=LOST_NS)
-            if silent.any():
-                return failed(state, losses.fell_silent(swarm, silent, state.phase), Phase.LAND)
-        return state
+    def _obeying(self, state: FlightState, swarm: Swarm) -> Flags:
+        """(N,) who flies our set-points, and nobody else's."""
+        return np.asarray(self._fleet.obeying(swarm) & ~state.released)
 
     def _join(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
         missing = [system for row, system in enumerate(swarm.ids) if not self._fleet.known(swarm, row)]
         if not missing:
-            offset, run_up_m = self._offset_ne, self._run_up_m(self._run_up_ticks)
-            ahead = self.plan.segments[0].velocity_ne / self.scenario.mission.cruise_m_s
-            frame = swarm_frame(swarm.origin, swarm.position_ned[:, :2], offset, run_up_m * ahead)
-            shift = frame.to_ne(swarm.origin[:, 0], swarm.origin[:, 1])
-            return self._climb(replace(entered(state, Phase.CLIMB), frame=frame, shift_ne=shift), swarm, now_ns)
+            return self._cleared(state, swarm, now_ns)
         if (state.tick - state.phase_tick) * self._period_s > JOIN_S:
             verb = "was" if len(missing) == 1 else "were"
             problem = f"{losses.vehicles(missing)} {verb} not heard, or not ready to arm, within {JOIN_S:g} s"
             return self._land(failed(state, problem, Phase.DONE), swarm, now_ns)
         return self._ask(state, swarm, lambda row: self._fleet.next_to_know(swarm, row))
+
+    def _cleared(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
+        """Everything is known: nobody is armed if anything speaks against it."""
+        refusals = (*losses.in_use(swarm), *preflight.refusals(swarm, self.scenario))
+        if refusals:
+            return self._land(failed(state, "; ".join(refusals), Phase.DONE), swarm, now_ns)
+        run_up_ne = self._run_up_m(self._run_up_ticks) * self._ahead
+        frame = swarm_frame(swarm.origin, swarm.position_ned[:, :2], self._offset_ne, run_up_ne)
+        shift = frame.to_ne(swarm.origin[:, 0], swarm.origin[:, 1])
+        return self._climb(replace(entered(state, Phase.CLIMB), frame=frame, shift_ne=shift), swarm, now_ns)
 
     def _climb(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
         if all(self._fleet.hovering(swarm, row) for row in range(len(swarm.ids))):
@@ -191,9 +178,8 @@ class Flight:
         ask: Commands = []
         if streaming_s >= STREAM_FIRST_S:
             state, ask, _ = self._ask(state, swarm, lambda row: _some(self._fleet.next_to_obey(swarm, row)))
-        state, commands, diagnosis = self._steer(
-            state, now_ns, swarm, np.zeros((len(swarm.ids), 2)), self._overview(state, swarm)
-        )
+        asked = self._steering.at_height(swarm, np.zeros((len(swarm.ids), 2)))
+        state, commands, diagnosis = self._steering.send(state, swarm, now_ns, asked, self._overview(state, swarm))
         return state, ask + commands, diagnosis
 
     def _run_up(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
@@ -202,21 +188,19 @@ class Flight:
         if self._opens_the_mission(state):
             state = replace(entered(state, Phase.MISSION), mission_tick=state.tick)
             return self._mission(state, swarm, now_ns)
-        cruise = self.scenario.mission.cruise_m_s
-        ahead = self.plan.segments[0].velocity_ne / cruise
+        cruise, ahead = self.scenario.mission.cruise_m_s, self._ahead
         _, speed = mission.run_up(cruise, self.scenario.mission.run_up_s, (into + 1) * self._period_s)
         place = self._offset_ne - (self._run_up_m(self._run_up_ticks) - self._run_up_m(into)) * ahead
         diagnosis = self._overview(state, swarm)
         back = RUN_UP_GAIN * (place - diagnosis.position_ne)
         asked = speed * ahead + capped(np.where(np.isfinite(back), back, 0.0), RUN_UP_CAP)
-        return self._steer(state, now_ns, swarm, asked, diagnosis)
+        return self._steering.send(state, swarm, now_ns, self._steering.at_height(swarm, asked), diagnosis)
 
     def _mission(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
         time_s = self._mission_s(state)
         if time_s >= self.plan.read_out_s - 1e-9:
             return self._land(entered(state, Phase.LAND), swarm, now_ns)
-        obeying = self._fleet.obeying(swarm)
-        flying = obeying & ~losses.down(swarm, self.scenario.swarm.altitude_m)
+        flying = self._obeying(state, swarm) & ~losses.down(swarm, self.scenario.swarm.altitude_m)
         diagnosis = self._overview(state, swarm)
         heard = flying & swarm.fresh(now_ns, within_ns=STALE_NS)
         observation = Observation(diagnosis.position_ne, swarm.velocity_ned[:, :2], heard, diagnosis.trust, time_s)
@@ -226,39 +210,53 @@ class Flight:
         except RuleError as error:  # a researcher's own; who flies it is in the air
             return self._land(failed(abandoned(state), str(error), Phase.LAND), swarm, now_ns)
         state = self._note_the_lost(replace(state, memory=memory), swarm, flying, now_ns)
-        commanded = flying & swarm.fresh(now_ns, within_ns=LOST_NS)
-        if self.scenario.trust.beyond_repair == "keep":
-            return self._steer(state, now_ns, swarm, decision.velocity_ne, diagnosis, decision, commanded)
-        return self._leave_behind(state, now_ns, swarm, diagnosis, decision, commanded)
+        return self._fly(state, swarm, now_ns, decision, diagnosis, flying)
 
-    def _leave_behind(
+    def _fly(
         self,
         state: FlightState,
-        now_ns: int,
         swarm: Swarm,
-        diagnosis: Diagnosis,
+        now_ns: int,
         decision: Decision,
-        commanded: npt.NDArray[np.bool_],
+        diagnosis: Diagnosis,
+        flying: Flags,
     ) -> Step:
-        """Steer the swarm, and those who leave it or come back to it out of its way."""
-        roles, commands = decision.roles, list[tuple[int, Command]]()
-        if self.scenario.trust.beyond_repair == "land":
-            state, commands, _ = self._ask(
-                state, swarm, lambda row: _some(self._fleet.next_to_land(swarm, row)) if roles.gone[row] else ()
-            )
-            commanded = commanded & ~roles.gone
-        lower = leaving.lowered(roles, swarm, diagnosis.position_ne)
-        state, steering, diagnosis = self._steer(
-            state, now_ns, swarm, decision.velocity_ne, diagnosis, decision, commanded, lower=lower
+        """Steer the swarm, those who leave it or come back to it out of its way, and those whom others give back."""
+        roles, coming = decision.roles, state.hands.coming
+        descends = roles.gone & (self.scenario.trust.beyond_repair == "land")
+        state, commands, _ = self._ask(state, swarm, lambda row: self._next_in_mission(swarm, row, descends, coming))
+        leaves = self.scenario.trust.beyond_repair != "keep"
+        lower = leaving.lowered(roles, swarm, diagnosis.position_ne) if leaves else 0.0
+        asked = self._steering.at_height(swarm, decision.velocity_ne, lower=lower)
+        if roles.gone.any():
+            asked = leaving.settled(asked, roles)
+        among = (flying | coming) & ~descends
+        state, steering, diagnosis = self._steering.send(state, swarm, now_ns, asked, diagnosis, among=among)
+        return state, commands + steering, replace(diagnosis, decision=decision)
+
+    def _next_in_mission(self, swarm: Swarm, row: int, descends: Flags, coming: Flags) -> tuple[Command, ...]:
+        """What one vehicle is asked for beside set-points."""
+        if descends[row]:
+            return _some(self._fleet.next_to_land(swarm, row))
+        return _some(self._fleet.next_to_obey(swarm, row)) if coming[row] else ()
+
+    def _hold(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
+        """Stay in the air; who comes down by itself is not stopped, and the flight is over when all have."""
+        if self._told(state) and not (swarm.armed & ~state.released).any():
+            return self._land(entered(state, Phase.DONE), swarm, now_ns)
+        landing = self._fleet.landing(swarm)
+        state, commands, diagnosis = self._ask(
+            state, swarm, lambda row: () if landing[row] else _some(self._fleet.next_to_hold(swarm, row))
         )
+        still, obeying = np.zeros((len(swarm.ids), 3)), self._obeying(state, swarm)
+        state, steering, diagnosis = self._steering.send(state, swarm, now_ns, still, diagnosis, among=obeying)
         return state, commands + steering, diagnosis
 
     def _land(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
         heard = swarm.fresh(now_ns, within_ns=LOST_NS)
-        told = (state.tick - state.phase_tick) * self._period_s >= TOLD_S
-        if told and not (swarm.armed & heard).any() and state.phase is not Phase.DONE:
-            unseen = swarm.armed & ~heard
-            problem = losses.fell_silent(swarm, unseen, state.phase) if unseen.any() else None
+        awaited = swarm.armed & (~state.released | state.hands.killing)
+        if self._told(state) and not (awaited & heard).any() and state.phase is not Phase.DONE:
+            problem = losses.fell_silent(swarm, awaited, state.phase) if awaited.any() else None
             state = replace(entered(state, Phase.DONE), problem=state.problem or problem)
         return self._ask(
             state,
@@ -266,65 +264,33 @@ class Flight:
             lambda row: _some(self._fleet.next_to_land(swarm, row)) if state.phase is Phase.LAND else (),
         )
 
+    def _told(self, state: FlightState) -> bool:
+        """Heartbeats have had the time to show what this phase asked for."""
+        return (state.tick - state.phase_tick) * self._period_s >= TOLD_S
+
+    def _kill(self, state: FlightState, swarm: Swarm) -> tuple[FlightState, Commands]:
+        """Stop the rotors of those whom the operator said it of, again and again until they are seen to stand."""
+        killing = state.hands.killing
+        if not killing.any():
+            return state, []
+        again = (state.tick - state.hands.killed_tick) % self.scenario.time.ticks(RETRY_S) == 0
+        commands: Commands = [(swarm.ids[row], Kill()) for row in np.flatnonzero(killing & again)]
+        return replace(state, hands=replace(state.hands, killing=killing & swarm.armed)), commands
+
     def _ask(self, state: FlightState, swarm: Swarm, what: Callable[[int], tuple[Command, ...]]) -> Step:
-        """Ask every vehicle for what it still lacks; for the same, or less of it, only after RETRY_S."""
+        """Ask every vehicle of ours for what it still lacks; for the same, or less of it, only after RETRY_S."""
         commands: Commands = []
         asked = list(state.asked)
         patience = self.scenario.time.ticks(RETRY_S)
         for row, system in enumerate(swarm.ids):
-            wanted = what(row)
+            wanted = () if state.released[row] else what(row)
             repeated = set(wanted) <= set(asked[row].commands) and state.tick - asked[row].tick < patience
             if wanted and not repeated:
                 asked[row] = Asked(wanted, state.tick)
                 commands += [(system, command) for command in wanted]
         return replace(state, asked=tuple(asked)), commands, self._overview(state, swarm)
 
-    def _steer(
-        self,
-        state: FlightState,
-        now_ns: int,
-        swarm: Swarm,
-        velocity_ne: Array,
-        diagnosis: Diagnosis,
-        decision: Decision | None = None,
-        commanded: npt.NDArray[np.bool_] | None = None,
-        *,
-        lower: Array | float = 0.0,
-    ) -> Step:
-        """Add height (so many metres lower than the scenario's) and heading, pass the gate, send."""
-        height_error = swarm.position_ned[:, 2] + self.scenario.swarm.altitude_m - lower
-        down = np.clip(-HEIGHT_GAIN * height_error, -CLIMB_SPEED, CLIMB_SPEED)
-        asked = np.empty_like(swarm.position_ned)
-        asked[:, :2], asked[:, 2] = velocity_ne, down
-        if decision is not None and decision.roles.gone.any():
-            asked = leaving.settled(asked, decision.roles)
-        ours = np.ones(len(swarm.ids), bool) if commanded is None else commanded
-        place = np.column_stack(
-            [diagnosis.position_ne + self._run_up_m(self._run_up_ticks) * self._ahead, swarm.position_ned[:, 2]]
-        )
-        standing = Standing(
-            ids=swarm.ids,
-            ours=ours,
-            age_ns=now_ns - swarm.position_ns,
-            place_ned=place,
-            velocity_ned=swarm.velocity_ned,
-            before_ned=state.sent_ned,
-            lateness_ns=0,
-        )
-        passed = admit(asked, self._heading(diagnosis.virtual), standing, self._limits, dt=self._period_s)
-        diagnosis = replace(
-            diagnosis,
-            decision=decision,
-            asked_ned=asked,
-            sent_ned=passed.sent_ned,
-            verdict=passed.verdict,
-            commanded=passed.commanded,
-        )
-        return replace(state, sent_ned=passed.sent_ned), list(passed.commands), diagnosis
-
-    def _note_the_lost(
-        self, state: FlightState, swarm: Swarm, flying: npt.NDArray[np.bool_], now_ns: int
-    ) -> FlightState:
+    def _note_the_lost(self, state: FlightState, swarm: Swarm, flying: Flags, now_ns: int) -> FlightState:
         """The first vehicle to be lost is why the flight is incomplete; those that were left behind are not missed."""
         if state.problem is not None or state.memory is None:
             return state
@@ -339,7 +305,7 @@ class Flight:
 
     def _overview(self, state: FlightState, swarm: Swarm) -> Diagnosis:
         """What every phase has to say."""
-        position, time_s = self._position_ne(state, swarm), self._mission_s(state)
+        position, time_s = state.position_ne(swarm), self._mission_s(state)
         trust = self._beliefs.trust(state.belief, time_s)
         if math.isnan(time_s):
             return Diagnosis(state.phase, time_s, self.plan.segments[0].task, None, trust, None, position)
@@ -353,17 +319,6 @@ class Flight:
             position_ne=position,
             belief=state.belief,
         )
-
-    def _position_ne(self, state: FlightState, swarm: Swarm) -> Array:
-        """(N, 2) m in the swarm's frame; NaN until that is known."""
-        return np.asarray(swarm.position_ned[:, :2] + (np.nan if state.shift_ne is None else state.shift_ne))
-
-    def _heading(self, virtual: VirtualLeader | None) -> float:
-        """Face the direction of travel; at its end, the last leg's."""
-        north, east = self.plan.segments[0].velocity_ne if virtual is None else virtual.velocity_ne
-        if math.hypot(north, east) < 0.1 * self.scenario.mission.cruise_m_s:
-            north, east = self.plan.segments[-1].velocity_ne
-        return math.atan2(east, north)
 
     def _mission_s(self, state: FlightState) -> float:
         return math.nan if state.mission_tick is None else (state.tick - state.mission_tick) * self._period_s

@@ -11,11 +11,17 @@ import numpy.typing as npt
 from gcs.beliefs import Belief
 from gcs.commands import Command
 from gcs.events import Rating
+from gcs.hands import Hands
 from gcs.swarm_frame import SwarmFrame
+from gcs.telemetry import Flags, Swarm
 from trustr.controller import Decision, Memory
 from trustr.leader import VirtualLeader
 
 Array = npt.NDArray[np.float64]
+
+
+Commands = list[tuple[int, Command]]
+"""System id and command, in the order in which they leave."""
 
 
 class Phase(Enum):
@@ -26,6 +32,7 @@ class Phase(Enum):
     TAKE_CONTROL = "taking control"
     RUN_UP = "running up"
     MISSION = "mission"
+    HOLD = "holding"
     LAND = "landing"
     DONE = "done"
 
@@ -54,9 +61,15 @@ class FlightState:
     asked: tuple[Asked, ...]
     """(N) what each vehicle was last asked for, so that asking again can wait."""
     sent_ned: Array
-    """(N, 3) m/s: the set-points sent last."""
+    """(N, 3) m/s: the set-points sent last, as they were sent; zero for vehicles that were sent none."""
     belief: Belief
     """Of each robot's health."""
+    hands: Hands
+    """Who flies whom."""
+    start_ns: int | None = None
+    """When the first tick was decided, from which the others' deadlines follow; None before it."""
+    now_ns: int | None = None
+    """When the last tick was decided."""
     frame: SwarmFrame | None = None
     """None until every vehicle has told where it is."""
     shift_ne: Array | None = None
@@ -71,6 +84,19 @@ class FlightState:
     def done(self) -> bool:
         """Nothing is left to decide."""
         return self.phase is Phase.DONE
+
+    @property
+    def released(self) -> Flags:
+        """(N,) vehicles that a pilot, or their autopilot, took from us."""
+        return self.hands.released
+
+    def lateness_ns(self, now_ns: int, period_ns: int) -> int:
+        """How far this tick is behind its deadline, reckoned from the first."""
+        return 0 if self.start_ns is None else now_ns - self.start_ns - self.tick * period_ns
+
+    def position_ne(self, swarm: Swarm) -> Array:
+        """(N, 2) m in the swarm's frame; NaN until that is known."""
+        return np.asarray(swarm.position_ned[:, :2] + (np.nan if self.shift_ne is None else self.shift_ne))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,14 +128,18 @@ class Diagnosis:
     """What people said that counted at this tick."""
 
 
+Step = tuple[FlightState, Commands, Diagnosis]
+"""What a tick comes to."""
+
+
 def entered(state: FlightState, phase: Phase) -> FlightState:
     """The first tick of a phase; nobody has been asked for anything in it."""
     return replace(state, phase=phase, phase_tick=state.tick, asked=(Asked(),) * len(state.asked))
 
 
-def abandoned(state: FlightState) -> FlightState:
-    """Land before the mission is over: its clock stops, so that nobody scores what the landing does."""
-    return replace(entered(state, Phase.LAND), mission_tick=None)
+def abandoned(state: FlightState, phase: Phase = Phase.LAND) -> FlightState:
+    """Land, or hold, before the mission is over: its clock stops, so that nobody scores what comes after."""
+    return replace(entered(state, phase), mission_tick=None)
 
 
 def failed(state: FlightState, problem: str, phase: Phase) -> FlightState:

@@ -33,3 +33,11 @@ def fell_silent(swarm: Swarm, silent: Flags, phase: Phase) -> str:
 def vehicles(systems: Sequence[int]) -> str:
     """In words: vehicle 5; vehicles 4, 5."""
     return f"{'vehicle' if len(systems) == 1 else 'vehicles'} {', '.join(map(str, systems))}"
+
+
+def in_use(swarm: Swarm) -> tuple[str, ...]:
+    """Sentences for vehicles whose rotors turn before we asked for it: somebody else has them."""
+    return tuple(
+        f"vehicle {swarm.ids[row]} is armed already: whoever flies it lands it first"
+        for row in np.flatnonzero(swarm.armed)
+    )

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from gcs.events import Event, Rating
-from gcs.flight import Flight, Step
-from gcs.flight_state import FlightState, Phase
+from gcs.flight import Flight
+from gcs.flight_state import FlightState, Phase, Step
 from gcs.lockstep import Lockstep
 from gcs.loop import fly
 from gcs.scoring import Score, score

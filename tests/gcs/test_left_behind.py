@@ -5,8 +5,8 @@ import pytest
 from flights import column, recorded, told
 
 from gcs.events import Rating
-from gcs.flight import CLIMB_SPEED
 from gcs.leaving import ABOVE
+from gcs.steering import CLIMB_SPEED
 from scenarios import ScenarioError, load, offsets_ne
 from trustr.roles import GONE_S
 
