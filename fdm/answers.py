@@ -1,11 +1,13 @@
 """What a vehicle answers to messages that are no command: parameters, clocks, missions, old ways to ask for streams.
 
 Pages: https://mavlink.io/en/services/parameter.html, https://mavlink.io/en/services/timesync.html,
-https://mavlink.io/en/services/ping.html, https://mavlink.io/en/services/mission.html
+https://mavlink.io/en/services/ping.html, https://mavlink.io/en/services/mission.html,
+https://mavlink.io/en/services/ftp.html
 """
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from types import MappingProxyType
 from typing import Any
@@ -39,6 +41,10 @@ GROUPS = MappingProxyType(
 )
 """What REQUEST_DATA_STREAM asks for, of what we know. Source: ArduCopter's GCS_Mavlink.cpp, STREAM_…_msgs."""
 
+_FILE_HEADER = struct.Struct("<HBBBBBBI")
+"""seq, session, opcode, size, opcode that is answered, burst complete, padding, offset: then data fill the payload."""
+FILE_ACK, FILE_NACK, FILE_NOT_FOUND = 128, 129, 10
+
 
 class Answers:
     """One vehicle's answers. Streams that messages ask for, and the list of parameters, go through the schedule.
@@ -60,6 +66,7 @@ class Answers:
             dialect.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: self._mission_list,
             dialect.MAVLINK_MSG_ID_MISSION_COUNT: self._mission_upload,
             dialect.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: self._mission_clear,
+            dialect.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: self._file,
         }
         if autopilot == dialect.MAV_AUTOPILOT_ARDUPILOTMEGA:
             self._answers[dialect.MAVLINK_MSG_ID_REQUEST_DATA_STREAM] = self._data_stream
@@ -108,6 +115,15 @@ class Answers:
         return self._pack(
             dialect.MAVLink_mission_ack_message(frame.system, frame.component, result, message.mission_type)
         )
+
+    def _file(self, frame: Frame, message: Any, _step: int) -> list[bytes]:
+        """There are no files on board. MAVProxy looks for one with all parameters, and asks for them when told so."""
+        sequence, session, opcode, *_ = _FILE_HEADER.unpack(bytes(message.payload[: _FILE_HEADER.size]))
+        if opcode >= FILE_ACK:
+            return []
+        header = _FILE_HEADER.pack((sequence + 1) % 65536, session, FILE_NACK, 1, opcode, 0, 0, 0)
+        payload = (header + bytes([FILE_NOT_FOUND])).ljust(len(message.payload), b"\0")
+        return self._pack(dialect.MAVLink_file_transfer_protocol_message(0, frame.system, frame.component, payload))
 
     def _data_stream(self, _frame: Frame, message: Any, step: int) -> list[bytes]:
         """One rate for a group of messages, or for all groups."""

@@ -265,6 +265,20 @@ def test_there_are_no_missions_fences_or_rally_points_and_none_can_be_brought(au
     assert (told.get_type(), told.type, told.mission_type) == ("MISSION_ACK", dialect.MAV_MISSION_ACCEPTED, kind)
 
 
+@both
+def test_there_are_no_files_and_whoever_looks_for_one_is_told_so_at_once(autopilot):
+    client = Client(autopilot)
+
+    def ask(opcode, name=b"@PARAM/param.pck"):
+        payload = struct.pack("<HBBBBBBI", 65535, 84, opcode, len(name), 0, 0, 0, 0) + name
+        return client.ask(dialect.MAVLink_file_transfer_protocol_message(0, 1, 1, payload.ljust(251, b"\0")))
+
+    (told,) = ask(4)
+    assert (told.target_system, told.target_component) == (255, 190)
+    assert bytes(told.payload[:13]) == struct.pack("<HBBBBBBI", 0, 84, 129, 1, 4, 0, 0, 0) + bytes([10])
+    assert ask(128) == ask(129) == [], "an answer is no question"
+
+
 def rates(client):
     return {
         message: round(1.0 / client.schedule.interval_s(message))
@@ -298,7 +312,7 @@ def test_px4_does_not_know_the_old_way():
     assert rates(client) == {}
 
 
-asked = st.sampled_from([4, 20, 21, 23, 43, 44, 45, 66, 111, 0, 22, 76, 84])
+asked = st.sampled_from([4, 20, 21, 23, 43, 44, 45, 66, 110, 111, 0, 22, 76, 84])
 
 
 @both
