@@ -129,6 +129,8 @@ def test_px4_refuses_a_value_of_another_type_and_arducopter_does_not_look_at_it(
     px4, ardupilot = Client(PX4), Client(ARDUPILOT)
     (told,) = px4.set(b"NAV_DLL_ACT", 1.0, REAL32)
     assert struct.pack("<f", told.param_value) == struct.pack("<i", 3)
+    (told,) = px4.set(b"COM_OF_LOSS_T", 2.0, INT32)
+    assert told.param_value == 0.5
     (told,) = px4.set(b"NAV_DLL_ACT", bits(1), INT32)
     assert struct.pack("<f", told.param_value) == struct.pack("<i", 1)
     (told,) = ardupilot.set(b"FS_GCS_ENABLE", 1.0, REAL32)

@@ -108,6 +108,8 @@ def test_a_vehicle_knows_its_own_number(autopilot, name):
         ("COM_OF_LOSS_T", -0.1),
         ("COM_OF_LOSS_T", 60.1),
         ("COM_DL_LOSS_T", 4),
+        ("COM_DL_LOSS_T", math.nan),
+        ("COM_DL_LOSS_T", -math.inf),
         ("COM_OBL_RC_ACT", 6),
         ("NAV_DLL_ACT", 5),
         ("MAV_SYS_ID", 7),
