@@ -7,10 +7,12 @@ import time
 
 import pytest
 from clients import ARM, HZ, LOCAL_POSITION, REQUEST, SET_INTERVAL, TAKE_OFF, VERSION, Station, command, scenario
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from fdm.server import Server
 from fdm.world import SITE, World
 from wire.connection import Connection, ConnectionRefused
+from wire.signing import Signer
 
 LOOPBACK = "127.0.0.1"
 
@@ -185,6 +187,116 @@ def test_on_udpin_it_is_silent_until_spoken_to_and_then_answers_the_speaker():
     finally:
         server.close()
         client.udp.close()
+
+
+@contextlib.contextmanager
+def waiting(world, *, kind="udpin", speed=1.0, signer=None):
+    """(server that waits to be spoken to, the address where it does)."""
+    with bound() as free:
+        address = free.getsockname()
+    server = Server(world, Connection(kind, *address), ports="shared", speed=speed, signer=signer)
+    try:
+        yield server, address
+    finally:
+        server.close()
+
+
+@contextlib.contextmanager
+def calling(address):
+    """Two clients that speak to one address."""
+    clients = Listener(bound()), Listener(bound())
+    for client in clients:
+        client.peer = address
+    try:
+        yield clients
+    finally:
+        for client in clients:
+            client.udp.close()
+
+
+@pytest.mark.wall_clock
+def test_on_udpin_the_first_who_speaks_is_the_ground_station_and_nobody_else_is_heard_or_answered():
+    with waiting(abreast(1)) as (server, address), calling(address) as (first, second):
+        first.send(command(REQUEST, VERSION))
+        turn_until(server, [first, second], lambda: first.all("AUTOPILOT_VERSION"))
+        second.send(command(REQUEST, VERSION))
+        turn_until(server, [first, second], lambda: server.rejections)
+        assert server.rejections == {"wrong address": 1}
+        beats = len(first.all("HEARTBEAT"))
+        turn_until(server, [first, second], lambda: len(first.all("HEARTBEAT")) > beats + 1)
+        assert second.heard == []
+
+
+@pytest.mark.wall_clock
+def test_a_ground_station_that_fell_silent_can_be_followed_by_another(monkeypatch):
+    monkeypatch.setattr("fdm.server.GONE_S", 0.3)
+    with waiting(abreast(1)) as (server, address), calling(address) as (first, second):
+        first.send(command(REQUEST, VERSION))
+        turn_until(server, [first, second], lambda: first.all("AUTOPILOT_VERSION"))
+        silent = time.monotonic()
+        while not second.heard:
+            assert time.monotonic() - silent < 2.0
+            second.send(command(REQUEST, VERSION))
+            server.turn()
+            second.listen()
+        assert time.monotonic() - silent > 0.25
+        first.listen()
+        first.heard.clear()
+        turn_until(server, [first, second], lambda: second.all("HEARTBEAT"))
+        assert first.heard == []
+
+
+@pytest.mark.wall_clock
+def test_a_crowd_at_the_port_does_not_stop_physics_nor_the_ground_station():
+    with waiting(world := abreast(1), speed=4.0) as (server, address), calling(address) as (client, crowd):
+        client.send(command(SET_INTERVAL, LOCAL_POSITION, 50_000))
+        turn_until(server, [client], lambda: client.all("LOCAL_POSITION_NED"))
+        forged = crowd.pack(command(REQUEST, VERSION))
+        steps, behind, end = world.steps, 0.0, time.monotonic() + 1.0
+        while time.monotonic() < end:
+            for _ in range(50):
+                crowd.udp.sendto(forged, address)
+            server.turn()
+            behind = max(behind, server.behind_s)
+        assert world.steps - steps == pytest.approx(4.0 * HZ, rel=0.1)
+        assert behind < 0.2
+        client.send(command(REQUEST, VERSION))
+        turn_until(server, [client], lambda: client.all("AUTOPILOT_VERSION"))
+        crowd.listen()
+        assert crowd.heard == []
+        assert server.rejections["wrong address"] > 100
+
+
+@pytest.mark.wall_clock
+def test_a_client_over_tcp_is_answered_over_tcp():
+    with waiting(abreast(2), kind="tcpin") as (server, address), socket.create_connection(address) as line:
+        line.setblocking(False)
+        client, parser = Station(), dialect.MAVLink(None)
+        line.sendall(client.pack(command(REQUEST, VERSION, system=2)))
+
+        def answered():
+            with contextlib.suppress(BlockingIOError):
+                client.heard += [(None, message) for message in parser.parse_buffer(line.recv(4096)) or []]
+            return client.all("AUTOPILOT_VERSION", system=2) and client.all("HEARTBEAT", system=1)
+
+        turn_until(server, [], answered)
+
+
+@pytest.mark.wall_clock
+def test_with_a_key_only_who_has_it_is_heard_and_all_that_is_sent_is_signed():
+    key = bytes(range(32))
+    with waiting(abreast(1), signer=Signer(key)) as (server, address), calling(address) as (stranger, client):
+        stranger.send(command(REQUEST, VERSION))
+        turn_until(server, [], lambda: server.rejections)
+        assert server.rejections == {"unsigned": 1}
+        asked = Signer(key).sign(client.pack(command(REQUEST, VERSION)))
+        client.udp.sendto(asked, address)
+        turn_until(server, [stranger, client], lambda: client.all("AUTOPILOT_VERSION"))
+        assert stranger.heard == []
+        assert all(message.get_header().incompat_flags == 1 for _, message in client.heard)
+        client.udp.sendto(asked, address)
+        turn_until(server, [client], lambda: server.rejections["replayed"] == 1)
+        assert len(client.all("AUTOPILOT_VERSION")) == 1
 
 
 @pytest.mark.wall_clock
