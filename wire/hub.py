@@ -1,7 +1,7 @@
 """Many ports at once: known peers are read first, strangers in what time is left, so that a flood stops nobody.
 
-Whoever is told to the hub as known gets, on UDP, a socket of its own. What others send fills the listening socket alone,
-and the kernel throws away what does not fit there.
+Who is known gets, on UDP, a socket of its own. What others send fills the listening socket alone, and the kernel throws
+away what does not fit there.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ AT_ONCE = 256
 """Pieces that one known peer may hand in before it is the next one's turn."""
 STRANGERS_SHARE = 0.2
 """Of wall time, at most, goes to strangers."""
-STRANGERS_AT_ONCE_S = 0.002
+STRANGERS_AT_ONCE_S = 0.001
 """Seconds for strangers at one go; then known peers have their turn again."""
 STREAMS_AT_MOST = 32
 """Peers of streams whose beginnings of frames are kept."""
