@@ -30,6 +30,14 @@ SENSORS = (
 ESTIMATES = dialect.MAV_SYS_STATUS_AHRS
 """Healthy once sensors have settled."""
 PREARM, MOTORS = dialect.MAV_SYS_STATUS_PREARM_CHECK, dialect.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+FENCES = MappingProxyType(
+    {dialect.MAV_AUTOPILOT_PX4: 0, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA: dialect.MAV_SYS_STATUS_GEOFENCE},
+)
+"""ArduCopter's fence of FENCE_TYPE is there, but not enabled, and so never breached: MAVProxy warns of one that is."""
+NO_FENCE = MappingProxyType(
+    {dialect.MAV_AUTOPILOT_PX4: 0, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA: dialect.MAV_SYS_STATUS_GEOFENCE},
+)
+"""ArduPilot calls a fence that is not there healthy; without that MAVProxy tells of a breach."""
 
 SETTLED = 0x033F
 """Flags of an estimator that knows attitude, velocity and position, and can foretell them. Both autopilots number
@@ -81,11 +89,12 @@ def _system_state(moment: Moment) -> int:
 
 def _sys_status(craft: Craft, moment: Moment) -> Any:
     battery = craft.vehicle.battery
-    present = SENSORS | ESTIMATES | PREARM | MOTORS
-    enabled = present if moment.pilot.armed else present & ~MOTORS
-    health = SENSORS | MOTORS | (ESTIMATES | PREARM if craft.is_ready(moment.now) else 0)
+    fence = FENCES[craft.personality.autopilot]
+    needed = SENSORS | ESTIMATES | PREARM
+    enabled = needed | MOTORS if moment.pilot.armed else needed
+    health = SENSORS | MOTORS | fence | (ESTIMATES | PREARM if craft.is_ready(moment.now) else 0)
     return dialect.MAVLink_sys_status_message(
-        present,
+        needed | MOTORS | fence,
         enabled,
         health,
         0,

@@ -31,7 +31,7 @@ ALL = (HEARTBEAT, SYS_STATUS, SYSTEM_TIME, GPS_RAW, ATTITUDE, QUATERNION, LOCAL,
 ALL += (BATTERY, HOME, EXTENDED)
 OWN = {"px4": ESTIMATOR, "ardupilot": EKF}
 NEEDED = 0x1 | 0x2 | 0x4 | 0x20 | 0x10000000
-PREARM = 0x10000000
+PREARM, GEOFENCE = 0x10000000, 0x100000
 
 both = pytest.mark.parametrize("name", ["px4", "ardupilot"])
 
@@ -136,7 +136,8 @@ def test_sensors_are_there_at_once_and_healthy_to_arm_when_they_have_settled(nam
         assert status.onboard_control_sensors_enabled & NEEDED == NEEDED
         healthy = status.onboard_control_sensors_health & NEEDED
         assert healthy == (NEEDED if settled else NEEDED & ~PREARM)
-        assert status.onboard_control_sensors_health & ~status.onboard_control_sensors_present == 0
+        absent = status.onboard_control_sensors_health & ~status.onboard_control_sensors_present
+        assert absent == (GEOFENCE if name == "ardupilot" else 0), "no fence is no breach, ArduPilot says"
 
 
 @pytest.mark.parametrize(("time_s", "flags"), [(0.0, 0xA5), (3600.0, 0x33F)])
