@@ -45,5 +45,5 @@ class Truth:
         """(N, 3) m: north, east of the swarm's origin, height above each vehicle's home."""
         position = np.empty_like(self._geodetic)
         position[:, :2] = frame.to_ne(self._geodetic[:, 0], self._geodetic[:, 1])
-        position[:, 2] = self._geodetic[:, 2] - swarm.origin[:, 2]
+        position[:, 2] = self._geodetic[:, 2] - swarm.home_m
         return position
