@@ -34,10 +34,6 @@ FENCES = MappingProxyType(
     {dialect.MAV_AUTOPILOT_PX4: 0, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA: dialect.MAV_SYS_STATUS_GEOFENCE},
 )
 """ArduCopter's fence of FENCE_TYPE is there, but not enabled, and so never breached: MAVProxy warns of one that is."""
-NO_FENCE = MappingProxyType(
-    {dialect.MAV_AUTOPILOT_PX4: 0, dialect.MAV_AUTOPILOT_ARDUPILOTMEGA: dialect.MAV_SYS_STATUS_GEOFENCE},
-)
-"""ArduPilot calls a fence that is not there healthy; without that MAVProxy tells of a breach."""
 
 SETTLED = 0x033F
 """Flags of an estimator that knows attitude, velocity and position, and can foretell them. Both autopilots number

@@ -136,8 +136,9 @@ def test_sensors_are_there_at_once_and_healthy_to_arm_when_they_have_settled(nam
         assert status.onboard_control_sensors_enabled & NEEDED == NEEDED
         healthy = status.onboard_control_sensors_health & NEEDED
         assert healthy == (NEEDED if settled else NEEDED & ~PREARM)
-        absent = status.onboard_control_sensors_health & ~status.onboard_control_sensors_present
-        assert absent == (GEOFENCE if name == "ardupilot" else 0), "no fence is no breach, ArduPilot says"
+        assert status.onboard_control_sensors_health & ~status.onboard_control_sensors_present == 0
+        fence = [getattr(status, f"onboard_control_sensors_{word}") & GEOFENCE for word in ("enabled", "health")]
+        assert fence == [0, GEOFENCE if name == "ardupilot" else 0], "not in use, and not breached"
 
 
 @pytest.mark.parametrize(("time_s", "flags"), [(0.0, 0xA5), (3600.0, 0x33F)])
