@@ -10,14 +10,15 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from fdm.craft import EPOCH_US
 from fdm.world import World
 from scenarios import Scenario
 from wire.frames import Frame, Framer
 
 Array = npt.NDArray[np.float64]
 
-EPOCH_NS = 1_577_836_800_000_000_000
-"""2020-01-01T00:00Z: when every lockstep flight begins."""
+EPOCH_NS = 1000 * EPOCH_US
+"""2020-01-01T00:00Z: when every lockstep flight begins, on the vehicles' own clocks too."""
 
 
 class Lockstep:
