@@ -2,6 +2,7 @@
 
 import atexit
 import hashlib
+import math
 import os
 import subprocess
 import sys
@@ -64,11 +65,11 @@ class Counting:
 
 
 class Severed:
-    """A link that loses one vehicle, both ways, so many seconds after it was made."""
+    """A link that loses one vehicle, both ways, so many seconds after it was made, and may find it again."""
 
-    def __init__(self, link, clock, *, system, from_s):
+    def __init__(self, link, clock, *, system, from_s, to_s=math.inf):
         self._link, self._clock, self._system = link, clock, system
-        self._from_ns = clock.now() + round(from_s * 1e9)
+        self._from_ns, self._to_ns = clock.now() + from_s * 1e9, clock.now() + to_s * 1e9
 
     def receive(self):
         return [frame for frame in self._link.receive() if not self._lost(frame.system, frame.time_ns)]
@@ -82,7 +83,7 @@ class Severed:
         return self._link.rejected
 
     def _lost(self, system, time_ns):
-        return system == self._system and time_ns >= self._from_ns
+        return system == self._system and self._from_ns <= time_ns < self._to_ns
 
 
 @dataclass(frozen=True)
@@ -110,18 +111,26 @@ class Recorded:
 
 
 @cache
-def recorded(name, *overrides, seed=1, ratings=None):
+def recorded(name, *overrides, seed=1, ratings=None, autopilot="px4"):
     """One lockstep flight as `gcs run` flies it. ratings: a tuple known beforehand; None where nobody rates."""
-    return fly_and_record(name, *overrides, seed=seed, ratings=ratings)
+    return fly_and_record(name, *overrides, seed=seed, ratings=ratings, autopilot=autopilot)
 
 
 def fly_and_record(
-    name, *overrides, seed=1, through=None, out=None, events=tuple, watching=lambda _flight: (), ratings=None
+    name,
+    *overrides,
+    seed=1,
+    through=None,
+    out=None,
+    events=tuple,
+    watching=lambda _flight: (),
+    ratings=None,
+    autopilot="px4",
 ):
     """The same, not shared. through: wraps (link, clock);  events: what an operator says at each tick."""
     scenario = load(name, overrides=overrides)
     folder = scratch() if out is None else out
-    world = Lockstep.of(scenario, seed=seed)
+    world = Lockstep.of(scenario, seed=seed, autopilot=autopilot)
     link = Counting(world if through is None else through(world, world))
     operator = Saying(events)
     summary = flown(
