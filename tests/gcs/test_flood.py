@@ -100,6 +100,7 @@ def flooded(tmp_path_factory):
             out=tmp_path_factory.mktemp("flood"),
             operator=Saying(watch.events),
             watching=lambda _flight: (watch,),
+            say=lambda _words: None,
         )
         return watch, live.rejections, summary
 
