@@ -5,6 +5,8 @@ import math
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from fdm.endpoint import Endpoint
+from fdm.parameters import table
+from fdm.personality import PERSONALITIES
 from fdm.shaping import shape_of
 from fdm.surroundings import Surroundings
 from fdm.vehicle import Geodetic, Vehicle
@@ -18,10 +20,13 @@ LOCAL_NED, BODY_NED = dialect.MAV_FRAME_LOCAL_NED, dialect.MAV_FRAME_BODY_NED
 ALONE, WITH_YAW, WITH_YAW_RATE, FORCED = 0x0DC7, 0x09C7, 0x05C7, 0x0FC7
 """The type masks of a velocity set-point."""
 
-ACCEPTED, REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
-ARM, TAKE_OFF, LAND, MODE = 400, 22, 21, 176
+ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
+ARM, TAKE_OFF, LAND, RETURN, MODE = 400, 22, 21, 20, 176
 SET_INTERVAL, REQUEST = 511, 512
 HOLD, OFFBOARD = (4, 3), (6, 0)
+"""PX4's modes: main, sub."""
+STABILIZE, ALTITUDE_HOLD, GUIDED, LOITER, RTL, LANDING, BRAKE = 0, 2, 4, 5, 6, 9, 17
+"""ArduCopter's."""
 HEARTBEAT, ATTITUDE, LOCAL_POSITION, GLOBAL_POSITION, INTERVAL = 0, 30, 32, 33, 244
 GPS_ORIGIN, VERSION = 49, 148
 
@@ -70,6 +75,17 @@ def command(number, *params, system=1, component=1):
     return dialect.MAVLink_command_long_message(system, component, number, 0, *padded)
 
 
+def command_int(number, *params, frame=0, z=0.0):
+    """COMMAND_INT; params: 1 to 4."""
+    padded = (*params, *(0.0,) * (4 - len(params)))
+    return dialect.MAVLink_command_int_message(1, 1, frame, number, 0, 0, *padded, 0, 0, z)
+
+
+def parameter(name, value):
+    """PARAM_SET of a real number."""
+    return dialect.MAVLink_param_set_message(1, 1, name.encode(), value, dialect.MAV_PARAM_TYPE_REAL32)
+
+
 def setpoint(velocity, *, mask=ALONE, frame=LOCAL_NED, yaw=0.0, yaw_rate=0.0, system=1, component=1, time_ms=0):
     """SET_POSITION_TARGET_LOCAL_NED with a velocity [m/s]."""
     return dialect.MAVLink_set_position_target_local_ned_message(
@@ -80,13 +96,23 @@ def setpoint(velocity, *, mask=ALONE, frame=LOCAL_NED, yaw=0.0, yaw_rate=0.0, sy
 class Flight(Station):
     """A ground station beside one endpoint, without a socket."""
 
-    def __init__(self, told=None, *, yaw=0.0, hz=HZ, seed=1):
+    def __init__(self, told=None, *, yaw=0.0, hz=HZ, seed=1, autopilot="px4", stock=False):
         super().__init__()
         self.hz = hz
         vehicle = Vehicle(home=PLACE, yaw=yaw, physics_hz=hz)
         told = told or scenario()
         surroundings = Surroundings(told, vehicle=1, seed=seed)
-        self.endpoint = Endpoint(vehicle, surroundings, system=1, home=PLACE, physics_hz=hz, shape=shape_of(told))
+        self.endpoint = Endpoint(
+            vehicle,
+            surroundings,
+            system=1,
+            home=PLACE,
+            physics_hz=hz,
+            personality=PERSONALITIES[autopilot],
+            parameters=table(autopilot, stock),
+            noise=told.noise,
+            shape=shape_of(told),
+        )
         self.vehicle = vehicle
 
     @property
@@ -104,6 +130,10 @@ class Flight(Station):
     @property
     def speed(self):
         return math.hypot(*self.velocity)
+
+    def beat(self):
+        """A heartbeat of a ground station."""
+        self.send(dialect.MAVLink_heartbeat_message(dialect.MAV_TYPE_GCS, dialect.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3))
 
     def send(self, *messages):
         """In one datagram; what is answered at once is heard at once."""
@@ -140,6 +170,15 @@ class Flight(Station):
         assert self.ask(ARM, 1) == ACCEPTED
         assert self.ask(TAKE_OFF, 0, 0, 0, 0, 0, 0, PLACE.altitude_m + height) == ACCEPTED
         self.wait(height / 1.5 + 4.0)
+        return self
+
+    def guided(self, height=10.0):
+        """ArduCopter, on the ground and disarmed before; in GUIDED at this height after."""
+        self.wait(max(0.0, 3.2 - self.endpoint.time_s))
+        assert self.ask(MODE, 1, GUIDED) == ACCEPTED
+        assert self.ask(ARM, 1) == ACCEPTED
+        assert self.ask(TAKE_OFF, 0, 0, 0, 0, 0, 0, height) == ACCEPTED
+        self.wait(height / 2.5 + 6.0)
         return self
 
     def offboard(self, velocity=(0.0, 0.0, 0.0), seconds=0.2, **options):
