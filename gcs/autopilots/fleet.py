@@ -39,12 +39,23 @@ class Fleet:
 
     def known(self, swarm: Swarm, row: int) -> bool:
         """All that must be known before arming has been told, and the vehicle is ready to be armed."""
+        return not self.lacking(swarm, row)
+
+    def lacking(self, swarm: Swarm, row: int) -> tuple[str, ...]:
+        """In words, what a vehicle has not told, or is not, that it must before arming."""
         kind = self._kind(swarm, row)
-        if kind is None or not kind.ready(swarm)[row] or untold(int(swarm.autopilot[row]), swarm.parameters[row]):
-            return False
-        places = (*swarm.position_ned[row], *swarm.origin[row], swarm.home_m[row])
-        accuracy_told = not np.isnan(swarm.accuracy_m[row])
-        return bool(np.isfinite(places).all() and accuracy_told and swarm.landed_state[row] != UNKNOWN)
+        if kind is None:
+            return ("a heartbeat of PX4 or ArduPilot",)
+        told = (
+            ("position and velocity", np.isfinite(swarm.position_ned[row]).all()),
+            ("its origin", np.isfinite(swarm.origin[row]).all()),
+            ("its home", np.isfinite(swarm.home_m[row])),
+            ("its horizontal accuracy", not np.isnan(swarm.accuracy_m[row])),
+            ("whether it stands on the ground", swarm.landed_state[row] != UNKNOWN),
+            ("its own readiness to arm", kind.ready(swarm)[row]),
+        )
+        groups = untold(int(swarm.autopilot[row]), swarm.parameters[row])
+        return (*(what for what, is_told in told if not is_told), *(" or ".join(group) for group in groups))
 
     def next_to_fly(self, swarm: Swarm, row: int) -> Command | None:
         """Towards hovering at height; None where it is under way, or there."""

@@ -1,4 +1,4 @@
-"""PX4: arm, take off to an altitude above sea level, stream set-points, then OFFBOARD.
+"""PX4: hold, arm, take off to an altitude above sea level, stream set-points, then OFFBOARD.
 
 https://docs.px4.io/main/en/flight_modes/offboard.html
 """
@@ -21,7 +21,13 @@ SLOW_S: tuple[tuple[int, float], ...] = (
     (messages.EXTENDED_SYS_STATE, 1.0),
 )
 """Message id and interval of what is shown and recorded now and then."""
-UNREAD = (messages.BATTERY_STATUS, messages.GLOBAL_POSITION_INT)
+UNREAD = (
+    messages.BATTERY_STATUS,
+    messages.GLOBAL_POSITION_INT,
+    messages.ATTITUDE_QUATERNION,
+    messages.ATTITUDE_TARGET,
+    messages.VFR_HUD,
+)
 """Message ids of what PX4 streams unasked and nobody reads."""
 OFF_S = -1e-6
 """An interval of −1 µs turns a stream off."""
@@ -52,9 +58,11 @@ class Px4:
         return swarm.ready
 
     def next_to_fly(self, swarm: Swarm, row: int) -> Command | None:
-        """Towards hovering at height."""
+        """Towards hovering at height. What it did before may be a mode in which PX4 does not arm, or flies off."""
+        if not swarm.armed[row] and not may_arm(swarm, row):
+            return None
         if not swarm.armed[row]:
-            return Arm() if may_arm(swarm, row) else None
+            return Arm() if swarm.custom_mode[row] == _HOLD.custom_mode else ChangeMode(_HOLD.main, _HOLD.sub)
         taking_off = swarm.custom_mode[row] == _TAKEOFF.custom_mode
         if not taking_off and not at_height(swarm, row, self.height_m):
             return TakeOff(float(swarm.home_m[row]) + self.height_m)

@@ -69,21 +69,22 @@ def test_a_vehicle_of_which_everything_is_known_is_asked_for_nothing(autopilot):
 
 
 LACKING = {
-    "position_ned": (np.full((1, 3), np.nan), RequestStream(32, 0.1)),
-    "origin": (np.full((1, 3), np.nan), RequestMessage(49)),
-    "home_m": (np.full(1, np.nan), RequestMessage(242)),
-    "accuracy_m": (np.full(1, np.nan), RequestMessage(24)),
-    "ready": (np.zeros(1, bool), RequestStream(1, 1.0)),
-    "landed_state": (np.zeros(1, int), RequestStream(245, 1.0)),
+    "position_ned": (np.full((1, 3), np.nan), RequestStream(32, 0.1), "position and velocity"),
+    "origin": (np.full((1, 3), np.nan), RequestMessage(49), "its origin"),
+    "home_m": (np.full(1, np.nan), RequestMessage(242), "its home"),
+    "accuracy_m": (np.full(1, np.nan), RequestMessage(24), "its horizontal accuracy"),
+    "ready": (np.zeros(1, bool), RequestStream(1, 1.0), "its own readiness to arm"),
+    "landed_state": (np.zeros(1, int), RequestStream(245, 1.0), "whether it stands on the ground"),
 }
 
 
 @both
 @pytest.mark.parametrize("lacking", LACKING)
 def test_what_is_not_known_is_asked_for(autopilot, lacking):
-    unknown, request = LACKING[lacking]
+    unknown, request, words = LACKING[lacking]
     swarm = vehicle(autopilot, **{lacking: unknown})
     assert not FLEET.known(swarm, 0)
+    assert FLEET.lacking(swarm, 0) == (words,)
     assert request in FLEET.next_to_know(swarm, 0)
 
 
@@ -102,6 +103,7 @@ def test_every_parameter_is_asked_for_until_it_is_told(autopilot):
         swarm = vehicle(autopilot, parameters=(rest,))
         asked = [command for command in FLEET.next_to_know(swarm, 0) if isinstance(command, RequestParameter)]
         assert not FLEET.known(swarm, 0)
+        assert name in FLEET.lacking(swarm, 0)[0]
         assert RequestParameter(name) in asked
         assert not {command.name for command in asked} & set(rest)
 
@@ -154,6 +156,7 @@ def guided(**situation):
     ("swarm", "step"),
     [
         (vehicle(PX4), Arm()),
+        *((vehicle(PX4, mode), ChangeMode(4, 3)) for mode in ("land", "return", "mission", "offboard", "manual")),
         (vehicle(PX4, armed=True), TakeOff(330.0)),
         (vehicle(PX4, "takeoff", armed=True, height=3.0), None),
         (vehicle(PX4, armed=True, height=HEIGHT), None),
