@@ -145,12 +145,14 @@ class Flight:
         return np.asarray(self._fleet.obeying(swarm) & ~state.released)
 
     def _join(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
-        missing = [system for row, system in enumerate(swarm.ids) if not self._fleet.known(swarm, row)]
+        missing = [row for row in range(len(swarm.ids)) if not self._fleet.known(swarm, row)]
         if not missing:
             return self._cleared(state, swarm, now_ns)
         if (state.tick - state.phase_tick) * self._period_s > JOIN_S:
             verb = "was" if len(missing) == 1 else "were"
-            problem = f"{losses.vehicles(missing)} {verb} not heard, or not ready to arm, within {JOIN_S:g} s"
+            who = losses.vehicles([swarm.ids[row] for row in missing])
+            lacks = (f"{swarm.ids[row]} lacks {', '.join(self._fleet.lacking(swarm, row))}" for row in missing)
+            problem = f"{who} {verb} not heard, or not ready to arm, within {JOIN_S:g} s: {'; '.join(lacks)}"
             return self._land(failed(state, problem, Phase.DONE), swarm, now_ns)
         return self._ask(state, swarm, lambda row: self._fleet.next_to_know(swarm, row))
 
