@@ -87,7 +87,7 @@ def test_trustr_imports_with_numpy_and_scipy_alone():
 
 def test_wire_imports_without_any_other_room():
     done = importing(
-        ["wire.frames", "wire.payloads", "wire.modes", "wire.connection", "wire.ports", "wire.clock"],
+        ["wire.frames", "wire.payloads", "wire.modes", "wire.connection", "wire.ports", "wire.signing", "wire.clock"],
         without=set(ROOMS) - {"wire"} | {"numpy", "jsbsim"},
     )
     assert done.returncode == 0, done.stderr

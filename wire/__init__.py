@@ -1,4 +1,4 @@
-"""What both ends of a link share: frames, hot payloads, mode numbers, connection strings, sockets, wall clock.
+"""What both ends of a link share: frames, signatures, hot payloads, numbers of modes, parameters, ports, wall clock.
 
 Knows no swarm.
 """

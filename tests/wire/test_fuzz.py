@@ -18,8 +18,8 @@ DATAGRAMS = 1_000_000 if os.environ.get("TRUSTR_PROFILE") == "soak" else 20_000
 BATCH = 200
 KEY, WRONG_KEY = bytes(range(32)), bytes(32)
 KNOWN = sorted(dialect.mavlink_map)
-LUCK = 20 / 65_536
-"""Of datagrams: with up to some twenty wrong headers in each, how many may hold a lucky one."""
+LUCKY = 3 + 4 * DATAGRAMS // 65_536
+"""Genuine frames that a lucky header may take along: one in 50 000 datagrams was seen to, whatever the framer."""
 
 
 class Air:
@@ -201,7 +201,7 @@ def test_genuine_frames_in_one_stretch_of_bytes_with_hostile_ones_are_all_delive
         believed += len(admitted)
         sent += len(good)
     assert sent > DATAGRAMS * 0.18
-    assert sent - believed <= DATAGRAMS * LUCK
+    assert sent - believed <= LUCKY
 
 
 def cut(stream, rng):

@@ -3,6 +3,8 @@
 import os
 import select
 import socket
+import subprocess
+import sys
 import tty
 
 import pytest
@@ -237,6 +239,11 @@ def test_no_such_device_and_no_serial_line_are_refused_in_one_sentence(tmp_path)
     for device, words in (("/dev/no-such-device", "there is no such device"), (plain, "this is not a serial line")):
         with pytest.raises(ConnectionRefused, match=rf"^serial:{device}:57600: {words}[^\n]*$"):
             open_port(Connection("serial", device=str(device), bits_per_s=57600))
+
+
+def test_only_who_opens_a_serial_line_waits_for_the_import_of_pyserial():
+    code = "import sys, wire.ports; sys.exit('serial' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_a_full_serial_line_refuses_and_goes_on_where_it_stopped(opened, terminal):
