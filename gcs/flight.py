@@ -151,8 +151,9 @@ class Flight:
         if (state.tick - state.phase_tick) * self._period_s > JOIN_S:
             verb = "was" if len(missing) == 1 else "were"
             who = losses.vehicles([swarm.ids[row] for row in missing])
-            lacks = (f"{swarm.ids[row]} lacks {', '.join(self._fleet.lacking(swarm, row))}" for row in missing)
-            problem = f"{who} {verb} not heard, or not ready to arm, within {JOIN_S:g} s: {'; '.join(lacks)}"
+            lacking = ((swarm.ids[row], what) for row in missing for what in self._fleet.lacking(swarm, row))
+            told = "; ".join(preflight.by_vehicles(lacking))
+            problem = f"{who} {verb} not heard, or not ready to arm, within {JOIN_S:g} s, for lack of: {told}"
             return self._land(failed(state, problem, Phase.DONE), swarm, now_ns)
         return self._ask(state, swarm, lambda row: self._fleet.next_to_know(swarm, row))
 

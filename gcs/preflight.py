@@ -16,11 +16,12 @@ https://ardupilot.org/copter/docs/gcs-failsafe.html
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import MappingProxyType
 
 import numpy as np
 
+from gcs.losses import vehicles
 from gcs.messages import GROUND_SYSTEM
 from gcs.parameters import untold
 from gcs.telemetry import Swarm
@@ -55,15 +56,19 @@ _ON_LINK_LOST = MappingProxyType({0: "nothing", 1: "hold", 2: "return", 3: "land
 
 def refusals(swarm: Swarm, scenario: Scenario) -> tuple[str, ...]:
     """Why these vehicles may not be armed for this scenario; empty where they may. Says nothing of who is not heard."""
+    heard = [row for row in range(len(swarm.ids)) if swarm.autopilot[row]]
     return (
-        *(
-            f"vehicle {system}: {why}"
-            for row, system in enumerate(swarm.ids)
-            for why in _vehicle(swarm, row, scenario)
-            if swarm.autopilot[row]
-        ),
+        *by_vehicles((swarm.ids[row], why) for row in heard for why in _vehicle(swarm, row, scenario)),
         *_spacing(swarm, scenario),
     )
+
+
+def by_vehicles(said: Iterable[tuple[int, str]]) -> tuple[str, ...]:
+    """What is said of systems, (id, words), each thing once with all of whom it is said."""
+    systems: dict[str, list[int]] = {}
+    for system, words in said:
+        systems.setdefault(words, []).append(system)
+    return tuple(f"{vehicles(who)}: {words}" for words, who in systems.items())
 
 
 def _vehicle(swarm: Swarm, row: int, scenario: Scenario) -> Iterator[str]:

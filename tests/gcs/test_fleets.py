@@ -181,8 +181,8 @@ def test_our_vehicles_protect_themselves_and_say_so(autopilot):
 @pytest.mark.parametrize(("autopilot", "name"), [("px4", "COM_OBL_RC_ACT = 0"), ("ardupilot", "FS_GCS_ENABLE = 0")])
 def test_vehicles_as_they_are_delivered_do_not(autopilot, name):
     scenario = load("transit")
-    why = refusals(joined(Lockstep.of(scenario, seed=1, autopilot=autopilot, stock_failsafes=True)), scenario)
-    assert [words[: words.index(" (")] for words in why] == [f"vehicle {system}: {name}" for system in range(1, 7)]
+    (why,) = refusals(joined(Lockstep.of(scenario, seed=1, autopilot=autopilot, stock_failsafes=True)), scenario)
+    assert why.startswith(f"vehicles 1, 2, 3, 4, 5, 6: {name} (")
 
 
 @pytest.mark.parametrize("autopilot", AUTOPILOTS)

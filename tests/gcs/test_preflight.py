@@ -175,6 +175,12 @@ def test_an_autopilot_that_we_do_not_know_is_refused_and_one_that_is_not_heard_i
     assert refusals(fleet((0, {})), SCENARIO) == ()
 
 
+def test_what_holds_for_several_vehicles_is_said_once():
+    swarm = fleet((PX4, PROTECTED[PX4]), *[(ARDUPILOT, AS_DELIVERED[ARDUPILOT])] * 3)
+    (why,) = refusals(swarm, SCENARIO)
+    assert why.startswith("vehicles 2, 3, 4: FS_GCS_ENABLE = 0 (")
+
+
 def test_every_vehicle_is_named_with_everything_that_is_wrong_with_it():
     swarm = fleet(
         (PX4, PROTECTED[PX4] | {"COM_OF_LOSS_T": 5.0, "MPC_XY_VEL_MAX": 1.0}),
