@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
+
+from gcs.console import asked
 
 if TYPE_CHECKING:
     from scenarios import Scenario
@@ -91,6 +93,20 @@ def check_seed(seed: int | None) -> None:
         raise BadUsageError(f"--seed {seed}: must not be above {MOST_SEED}")
 
 
+def check_speed(speed: float) -> None:
+    """Raises BadUsageError for a clock that stands, or goes backwards."""
+    if not 0.0 < speed < math.inf:
+        raise BadUsageError(f"--speed {speed}: must be a number above 0")
+
+
+def checked_ids(systems: Sequence[int]) -> tuple[int, ...]:
+    """System ids as named, each once. Raises BadUsageError."""
+    for system in systems:
+        if not 1 <= system <= 255:
+            raise BadUsageError(f"--vehicle {system}: must be a system id, 1 to 255")
+    return tuple(dict.fromkeys(systems))
+
+
 def check_many(seeds: int | None, jobs: int) -> None:
     """Raises BadUsageError for no flights, or nobody to fly them."""
     if seeds is not None and seeds < 1:
@@ -103,12 +119,8 @@ def confirmed(yes: bool, *, say: Callable[[str], None]) -> bool:
     """Arming moves rotors: a person types ARM, or a script says --yes."""
     if yes:
         return True
-    if not sys.stdin.isatty():
-        say("gcs: --arm without a terminal needs --yes")
-        return False
-    sys.stderr.write("Rotors will turn. Type ARM to go on: ")
-    sys.stderr.flush()
-    if sys.stdin.readline().strip() == "ARM":
+    typed = asked("Rotors will turn. Type ARM to go on: ")
+    if typed == "ARM":
         return True
-    say("gcs: not armed")
+    say("gcs: --arm without a terminal needs --yes" if typed is None else "gcs: not armed")
     return False

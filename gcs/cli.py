@@ -5,19 +5,26 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 from cyclopts import App, CycloptsError, Parameter
 
-from gcs.choices import AS_IT_IS, BadUsageError, Choices, Overrides, check_many, check_seed, confirmed
+from gcs import console
+from gcs.choices import (
+    AS_IT_IS,
+    BadUsageError,
+    Choices,
+    Overrides,
+    check_many,
+    check_seed,
+    check_speed,
+    checked_ids,
+)
+from gcs.guard import BAD_INPUT, FLOWN, INTERRUPTED, NOT_COMPLETED, guarded
+from gcs.options import AsJson, LinkTexts, Out, ScenarioName, SigningKey, Vehicles
 from gcs.supervision import NOBODY, Supervision
-
-if TYPE_CHECKING:
-    from gcs.events import Rating
-    from gcs.summary import Summary
-    from scenarios import Scenario
 
 
 def _version() -> str:
@@ -31,20 +38,6 @@ app = App(
     help="Ground station for swarms that know whom to trust.",
     version=_version,
 )
-
-FLOWN, BAD_INPUT, NOT_COMPLETED, INTERRUPTED = 0, 2, 3, 130
-"""Exit codes."""
-
-LIVE_POSITIONS = 5
-"""A tick: real links deliver at any moment of it; asked once, a flight ended 0.5 m from its lockstep twin."""
-
-ScenarioName = Annotated[str, Parameter(help="A scenario's name (see `gcs scenarios`), or the path of a TOML file.")]
-Out = Annotated[
-    Path | None,
-    Parameter(help="Folder for run.mcap, summary.json and trajectory.png; runs/TIME-SCENARIO if absent."),
-]
-AsJson = Annotated[bool, Parameter(name="--json", negative=(), show_default=False, help="One JSON object on stdout.")]
-Yes = Annotated[bool, Parameter(negative=(), show_default=False, help="Do not ask before arming.")]
 
 
 @app.command
@@ -65,14 +58,16 @@ def run(
             from gcs.lockstep import Lockstep
         except ModuleNotFoundError as error:
             raise BadUsageError(f"run simulates, and needs {error.name}, which is not installed") from None
+        from gcs.flying import Request, flight
 
         check_seed(seed)
         chosen = choices.scenario(scenario)
         ratings = supervision.known(chosen, seed=seed)
         world = Lockstep.of(chosen, seed=seed)
-        return _fly(scenario, chosen, world, world, supervision, ratings, seed=seed, out=out, json=json)
+        request = Request(scenario, supervision, seed=seed, out=out, json=json)
+        return flight(chosen, request, world, world, ratings)
 
-    return _guarded(command)
+    return guarded(command)
 
 
 @app.command
@@ -82,45 +77,114 @@ def fly(
     choices: Choices = AS_IT_IS,
     supervision: Supervision = NOBODY,
     *,
-    link: Annotated[
-        tuple[str, ...],
-        Parameter(
-            negative=(), help="udpin:HOST:PORT or udpout:HOST:PORT; repeatable, PORT may be a range 14550-14555."
-        ),
-    ],
+    link: LinkTexts,
     arm: Annotated[
         bool, Parameter(negative=(), show_default=False, help="Arm and fly; without it, only listen.")
     ] = False,
-    yes: Yes = False,
+    yes: Annotated[bool, Parameter(negative=(), show_default=False, help="Do not ask before arming.")] = False,
+    degrade: Annotated[
+        int | None,
+        Parameter(help="Bend the set-points of this vehicle as the paper's fault does; its autopilot knows nothing."),
+    ] = None,
+    signing_key: SigningKey = None,
     speed: Annotated[float, Parameter(help="The vehicles' seconds a second, as `fdm serve --speed`.")] = 1.0,
     seed: Annotated[int | None, Parameter(help="Of `fdm serve`, for the record.")] = None,
     out: Out = None,
     json: AsJson = False,
 ) -> int:
-    """Fly a scenario with vehicles behind real links: `fdm serve`, or PX4."""
+    """Fly a scenario with vehicles behind real links: `fdm serve`, PX4 or ArduPilot."""
 
     def command() -> int:
-        from gcs.listen import listen
-        from gcs.live import Live
-        from wire.connection import parse
+        from gcs.flying import Hardware, Request, live
 
         check_seed(seed)
-        if not 0.0 < speed < math.inf:
-            raise BadUsageError(f"--speed {speed}: must be a number above 0")
-        chosen = choices.scenario(scenario).asking(LIVE_POSITIONS)
-        ratings = supervision.known(chosen, seed=seed)
-        connections = [connection for text in link for connection in parse(text)]
-        if arm and not confirmed(yes, say=_say):
-            return BAD_INPUT
-        live = Live(connections, range(1, chosen.swarm.count + 1), speed=speed)
-        try:
-            if not arm:
-                return listen(live, chosen, as_json=json, say=_say)
-            return _fly(scenario, chosen, live, live, supervision, ratings, seed=seed, out=out, json=json)
-        finally:
-            live.close()
+        check_speed(speed)
+        hardware = Hardware(link, arm, yes, degrade, signing_key, speed)
+        request = Request(scenario, supervision, seed=seed, out=out, json=json)
+        return live(choices.scenario(scenario), request, hardware)
 
-    return _guarded(command)
+    return guarded(command)
+
+
+@app.command
+def vehicles(
+    *,
+    link: LinkTexts,
+    seconds: Annotated[float, Parameter(help="How long to listen; Ctrl-C ends it sooner.")] = 5.0,
+    signing_key: SigningKey = None,
+    json: AsJson = False,
+) -> int:
+    """List every vehicle and ground station that is heard on a link; sends nothing."""
+
+    def command() -> int:
+        from gcs.links import LISTENS, opened, understood
+        from gcs.vehicles import listen
+
+        if not 0.0 < seconds < math.inf:
+            raise BadUsageError(f"--seconds {seconds}: must be a number above 0")
+        with opened(understood(link), None, purpose=LISTENS, signing_key=signing_key) as live:
+            return listen(live, seconds=seconds, as_json=json, console=console.stdout(), write=console.write)
+
+    return guarded(command)
+
+
+@app.command
+def land(*, link: LinkTexts, vehicle: Vehicles = (), signing_key: SigningKey = None) -> int:
+    """Land every vehicle heard on a link, or these: at once, whether or not a flight is under way."""
+
+    def command() -> int:
+        from gcs import operating
+
+        return operating.land(operating.Links.of(link, signing_key), checked_ids(vehicle))
+
+    return guarded(command)
+
+
+@app.command
+def hold(*, link: LinkTexts, vehicle: Vehicles = (), signing_key: SigningKey = None) -> int:
+    """Have every vehicle heard on a link, or these, stop and stay where they are."""
+
+    def command() -> int:
+        from gcs import operating
+
+        return operating.hold(operating.Links.of(link, signing_key), checked_ids(vehicle))
+
+    return guarded(command)
+
+
+@app.command
+def kill(
+    *,
+    link: LinkTexts,
+    vehicle: Vehicles = (),
+    yes: Annotated[bool, Parameter(negative=(), show_default=False, help="With --vehicle: do not ask.")] = False,
+    signing_key: SigningKey = None,
+) -> int:
+    """Stop rotors at once, in the air too: who flies falls. Asks twice."""
+
+    def command() -> int:
+        from gcs import operating
+
+        return operating.kill_vehicles(operating.Links.of(link, signing_key), checked_ids(vehicle), yes=yes)
+
+    return guarded(command)
+
+
+@app.command
+def take_back(
+    *,
+    link: LinkTexts,
+    vehicle: Annotated[int, Parameter(negative=(), help="System id of a vehicle that a pilot took from the flight.")],
+) -> int:
+    """Give a vehicle that a pilot, or its autopilot, took over back to the flight that is under way."""
+
+    def command() -> int:
+        from gcs import operating
+
+        (system,) = checked_ids((vehicle,))
+        return operating.back_to_the_flight(operating.Links.of(link, None), system)
+
+    return guarded(command)
 
 
 @app.command
@@ -128,7 +192,7 @@ def scenarios(*, json: AsJson = False) -> int:
     """List the scenarios that ship."""
     from gcs.listing import listing
 
-    return listing(as_json=json, console=_stdout())
+    return listing(as_json=json, console=console.stdout())
 
 
 @app.command
@@ -149,19 +213,19 @@ def reproduce(
         check_many(seeds, jobs)
         folder = output_folder(out, "reproduce")
         try:
-            result = fly_all(conditions(), seeds=seeds, jobs=jobs, console=_stderr())
+            result = fly_all(conditions(), seeds=seeds, jobs=jobs, console=console.stderr())
         except FlightNotCompleted as error:
-            _say(f"gcs: {error}")
+            console.say(f"gcs: {error}")
             return NOT_COMPLETED
         result.save(folder)
         if json:
-            _write(result.json())
+            console.write(result.json())
         else:
-            result.show(_stdout())
-            _say(f"written: {folder}/reproduce.json, {folder}/reproduce.md")
+            result.show(console.stdout())
+            console.say(f"written: {folder}/reproduce.json, {folder}/reproduce.md")
         return FLOWN
 
-    return _guarded(command)
+    return guarded(command)
 
 
 @app.command
@@ -187,10 +251,12 @@ def experiment(
         from gcs.experiment.command import experiment as conduct
 
         check_many(seeds, jobs)
-        console = None if json else _stdout()
-        return conduct(file, seeds=seeds, jobs=jobs, dask=dask, only=only, out=out, stdout=console, stderr=_stderr())
+        shown = None if json else console.stdout()
+        return conduct(
+            file, seeds=seeds, jobs=jobs, dask=dask, only=only, out=out, stdout=shown, stderr=console.stderr()
+        )
 
-    return _guarded(command)
+    return guarded(command)
 
 
 @app.command
@@ -208,14 +274,14 @@ def identify(
         from gcs.identify import as_json, as_toml, of_fleet
 
         check_many(seeds, 1)
-        found = of_fleet(fleet, overrides=set_, seeds=seeds, console=_stderr())
+        found = of_fleet(fleet, overrides=set_, seeds=seeds, console=console.stderr())
         if json:
-            _write(as_json(found))
+            console.write(as_json(found))
         else:
             sys.stdout.write(as_toml(found) + "\n")
         return FLOWN
 
-    return _guarded(command)
+    return guarded(command)
 
 
 @app.command
@@ -228,10 +294,10 @@ def compare(
     def command() -> int:
         from gcs.compare import compare as side_by_side
 
-        side_by_side(recordings, picture=out, console=_stdout())
+        side_by_side(recordings, picture=out, console=console.stdout())
         return FLOWN
 
-    return _guarded(command)
+    return guarded(command)
 
 
 @app.command
@@ -248,129 +314,9 @@ def replay(
     def command() -> int:
         from gcs.replay import verify as decide_again
 
-        return decide_again(recording, console=_stdout()) if verify else FLOWN
+        return decide_again(recording, console=console.stdout()) if verify else FLOWN
 
-    return _guarded(command)
-
-
-def _fly(
-    name: str,
-    scenario: Scenario,
-    link: Any,
-    clock: Any,
-    supervision: Supervision,
-    ratings: tuple[Rating, ...] | None,
-    *,
-    seed: int | None,
-    out: Path | None,
-    json: bool,
-) -> int:
-    """The one way a flight is flown, whatever it is flown with."""
-    from contextlib import ExitStack
-
-    from gcs.operator import Operator
-    from gcs.progress import Display
-    from gcs.session import flown, make_room, output_folder
-
-    with ExitStack() as stack:
-        live_ratings = supervision.live(stack, scenario, _say)
-        folder = output_folder(out, name)
-        earlier = make_room(folder)
-        if earlier is not None:
-            _say(f"an earlier recording is kept as {earlier}")
-        console = _stderr()
-        operator = stack.enter_context(
-            Operator(lambda words: console.print(words, highlight=False, markup=False), ratings=live_ratings)
-        )
-
-        def watching(flight: Any) -> tuple[Display]:
-            return (stack.enter_context(Display(flight, console, title=Path(name).stem)),)
-
-        summary = flown(
-            name,
-            scenario,
-            link,
-            clock,
-            seed=seed,
-            out=folder,
-            operator=operator,
-            watching=watching,
-            ratings=ratings,
-        )
-    _report(summary, folder, json=json)
-    if operator.interrupted:
-        return INTERRUPTED
-    return FLOWN if summary.completed else NOT_COMPLETED
-
-
-def _report(summary: Summary, folder: Path, *, json: bool) -> None:
-    from gcs.session import PICTURE
-    from gcs.words import verdict
-
-    if summary.problem is not None:
-        _say(f"gcs: {summary.problem}")
-    if json:
-        _write(summary.json())
-        return
-    lines = [verdict(summary), f"recording  {summary.recording}"]
-    if (folder / PICTURE).exists():
-        lines.append(f"picture    {(folder / PICTURE).resolve()}")
-    sys.stdout.write("\n".join(lines) + "\n")
-
-
-def _guarded(command: Callable[[], int]) -> int:
-    """Bad input is one sentence and exit code 2."""
-    try:
-        return command()
-    except Exception as error:
-        if not isinstance(error, _refusals()):
-            raise
-        _say(f"gcs: {error}")
-        return BAD_INPUT
-
-
-def _refusals() -> tuple[type[Exception], ...]:
-    """What speaks to a person; anything else is a defect and keeps its traceback."""
-    from gcs.compare import UnwritablePicture
-    from gcs.ratings import RatingsError
-    from gcs.recording.reader import UnreadableRecording
-    from gcs.recording.writer import RecordingError
-    from gcs.rules import RuleError
-    from scenarios import ScenarioError
-    from wire.connection import ConnectionRefused
-
-    return (
-        BadUsageError,
-        ScenarioError,
-        RuleError,
-        ConnectionRefused,
-        RecordingError,
-        RatingsError,
-        UnreadableRecording,
-        UnwritablePicture,
-    )
-
-
-def _write(line: bytes) -> None:
-    sys.stdout.write(line.decode() + "\n")
-
-
-def _say(words: str) -> None:
-    """On stderr, where progress and words go."""
-    sys.stderr.write(words + "\n")
-    sys.stderr.flush()
-
-
-def _stdout() -> Any:
-    from rich.console import Console
-
-    return Console(width=None if sys.stdout.isatty() else 110)
-
-
-def _stderr() -> Any:
-    from rich.console import Console
-
-    return Console(stderr=True)
+    return guarded(command)
 
 
 def main(words: Sequence[str] | None = None) -> None:

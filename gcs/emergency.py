@@ -49,6 +49,8 @@ class LastResort:
         """Remember whom to tell, and in whose way."""
         swarm = tick.swarm
         self._autopilots = dict(zip(swarm.ids, swarm.autopilot.tolist(), strict=True))
+        released = zip(swarm.ids, tick.state.released.tolist(), strict=True)
+        self._released = frozenset(system for system, gone in released if gone)
 
     def land(self) -> None:
         """Tell everybody who is ours, again and again: nobody listens for an answer."""

@@ -1,17 +1,26 @@
-"""Listening only: who is there, until Ctrl-C or until everybody is heard."""
+"""Listening before flying: who is there, and whether anything on the link speaks against flying at all."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable
 
+import numpy as np
 import orjson
 
+from gcs.autopilots import Fleet
+from gcs.commands import Beat
+from gcs.interventions import EVERYBODY
+from gcs.links import refused
 from gcs.live import Live
+from gcs.messages import Encoder
 from gcs.telemetry import Swarm, observe
 from scenarios import Scenario
+from wire.modes import mode_name
 
 LISTEN_S = 10.0
+FIRST_S = 2.5
+"""Before arming: two heartbeats of everybody."""
 
 
 def listen(live: Live, scenario: Scenario, *, as_json: bool, say: Callable[[str], None]) -> int:
@@ -30,7 +39,48 @@ def listen(live: Live, scenario: Scenario, *, as_json: bool, say: Callable[[str]
         sys.stdout.write(f"heard: {_ids(heard)}; missing: {_ids(missing)}\n")
     if missing and live.speaks_first:
         say("vehicles that wait to be spoken to stay silent: listening sends nothing")
+    for words in (*_against(live, swarm), *([refused(live.rejections)] if missing else [])):
+        if words is not None:
+            say(words)
     return 3 if missing else 0
+
+
+def before_arming(live: Live, scenario: Scenario, *, say: Callable[[str], None]) -> tuple[str, ...]:
+    """Listen for FIRST_S, and say why nobody may be armed on this link; empty where nothing speaks against it.
+
+    Whoever waits to be spoken to hears our heartbeat, and nothing else.
+    """
+    swarm = Swarm.of(range(1, scenario.swarm.count + 1))
+    encoder, start_ns = Encoder(EVERYBODY), live.now()
+    beat_ns, until_ns = start_ns, start_ns + round(FIRST_S * 1e9)
+    while live.now() < until_ns:
+        if live.speaks_first and live.now() >= beat_ns:
+            beat_ns += 1_000_000_000
+            live.send(EVERYBODY, encoder.encode(Beat(), 0))
+        live.sleep_until(min(until_ns, live.now() + scenario.time.period_ns))
+        swarm = observe(swarm, live.receive())
+    refusals = _against(live, swarm)
+    if not refusals:
+        for station in live.stations:
+            say(
+                f"ground station {station.system}.{station.component} is heard from {station.address}: let it not steer"
+            )
+    return refusals
+
+
+def _against(live: Live, swarm: Swarm) -> tuple[str, ...]:
+    """Two of one name, and vehicles that somebody steers already."""
+    fleet = Fleet(height_m=0.0, position_s=1.0)
+    others = ", ".join(f"{one.system}.{one.component} at {one.address}" for one in live.stations)
+    who = f"ground station {others}" if others else "another ground station"
+    return (
+        *(f"two vehicles call themselves {system}: give each an id of its own" for system in sorted(live.duplicates)),
+        *(
+            f"vehicle {swarm.ids[row]} already flies set-points "
+            f"({mode_name(int(swarm.autopilot[row]), int(swarm.custom_mode[row]))}): {who} steers it; end that first"
+            for row in np.flatnonzero(fleet.obeying(swarm))
+        ),
+    )
 
 
 def _ids(systems: list[int]) -> str:

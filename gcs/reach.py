@@ -129,7 +129,15 @@ def flying(connections: Iterable[Connection]) -> Flying | None:
 
 
 class Unanswered(Exception):
-    """The flight says nothing."""
+    """The flight says nothing in time; in a sentence that says what to do."""
+
+
+class Refused(ValueError):
+    """The flight does not take this word, in its own sentence."""
+
+
+class Ended(Exception):
+    """The flight is over."""
 
 
 class Call:
@@ -137,6 +145,7 @@ class Call:
 
     def __init__(self, flight: Flying) -> None:
         """Raises Unanswered where nobody listens."""
+        self._flight = flight
         self._rest = b""
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._socket.settimeout(ANSWERS_WITHIN_S)
@@ -144,7 +153,7 @@ class Call:
             self._socket.connect(str(flight.path))
         except OSError:
             self._socket.close()
-            raise Unanswered from None
+            raise self._unanswered() from None
 
     def __enter__(self) -> Call:
         return self
@@ -155,26 +164,39 @@ class Call:
         self._socket.close()
 
     def ask(self, word: str) -> dict[str, Any]:
-        """What is answered; its last words if the flight has ended. Raises Unanswered, ValueError where refused."""
+        """What is answered; its last words, with "over", where it ends.
+
+        Raises Unanswered, Ended and Refused.
+        """
         try:
             with suppress(BrokenPipeError, ConnectionResetError):  # it has ended, and may have said so
                 self._socket.sendall(orjson.dumps({"word": word}, option=orjson.OPT_APPEND_NEWLINE))
             while b"\n" not in self._rest:
                 more = self._socket.recv(1 << 16)
                 if not more:
-                    raise Unanswered
+                    raise Ended
                 self._rest += more
+        except TimeoutError:
+            raise self._unanswered() from None
         except OSError:
-            raise Unanswered from None
+            raise Ended from None
         line, _, self._rest = self._rest.partition(b"\n")
         answer: dict[str, Any] = orjson.loads(line)
         if "error" in answer:
-            raise ValueError(answer["error"])
+            raise Refused(answer["error"])
         return answer
+
+    def _unanswered(self) -> Unanswered:
+        process = self._flight.process
+        return Unanswered(
+            f"the flight of process {process} has {', '.join(self._flight.links)} and did not answer within "
+            f"{ANSWERS_WITHIN_S:g} s. If it hangs, its vehicles get no set-points and do what their failsafe "
+            f"parameters say. `kill -9 {process}` ends it and frees the link; then give this command again"
+        )
 
 
 def _vehicles(tick: Tick) -> dict[str, dict[str, object]]:
-    swarm, released = tick.swarm, tick.state.hands.released
+    swarm, released = tick.swarm, tick.state.released
     return {
         str(system): {
             "heard": bool(swarm.heartbeat_ns[row] != NEVER),

@@ -1,0 +1,150 @@
+"""`gcs run` and `gcs fly`: the one way a flight is flown from the command line, whatever it is flown with."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from gcs import console
+from gcs.choices import BadUsageError, confirmed
+from gcs.degrade import Degraded, degrading
+from gcs.events import Rating
+from gcs.flight import Flight
+from gcs.guard import BAD_INPUT, FLOWN, INTERRUPTED, NOT_COMPLETED
+from gcs.links import FLIES, LISTENS, opened, understood
+from gcs.listen import before_arming, listen
+from gcs.loop import Clock, Link
+from gcs.operator import Operator
+from gcs.progress import Display
+from gcs.rates import positions_per_tick
+from gcs.reach import ControlSocket
+from gcs.session import PICTURE, flown, make_room, output_folder
+from gcs.summary import Summary
+from gcs.supervision import Supervision
+from gcs.words import verdict
+from scenarios import MotorDegradation, Scenario
+from wire.connection import Connection
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What was asked for, besides the scenario's own keys."""
+
+    name: str
+    """Of the scenario, as it was typed."""
+    supervision: Supervision
+    seed: int | None
+    out: Path | None
+    json: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Hardware:
+    """Where the vehicles are, and what may be done with them."""
+
+    link: tuple[str, ...]
+    arm: bool
+    yes: bool
+    degrade: int | None
+    """System id of the vehicle whose set-points are bent on their way out."""
+    signing_key: Path | None
+    speed: float
+
+
+def live(scenario: Scenario, request: Request, hardware: Hardware) -> int:
+    """Fly vehicles behind real links, or only listen to them. Exit code."""
+    connections = understood(hardware.link)
+    if hardware.degrade is not None:
+        scenario = _with_one_degraded(scenario, hardware.degrade)
+    signed = hardware.signing_key is not None
+    scenario = scenario.asking(positions_per_tick(connections, scenario, signed=signed)).fenced()
+    ratings = request.supervision.known(scenario, seed=request.seed)
+    if hardware.arm and not confirmed(hardware.yes, say=console.say):
+        return BAD_INPUT
+    ids = range(1, scenario.swarm.count + 1)
+    purpose = FLIES if hardware.arm else LISTENS
+    with opened(connections, ids, purpose=purpose, speed=hardware.speed, signing_key=hardware.signing_key) as vehicles:
+        if not hardware.arm:
+            return listen(vehicles, scenario, as_json=request.json, say=console.say)
+        refusals = before_arming(vehicles, scenario, say=console.say)
+        if refusals:
+            raise BadUsageError("; ".join(refusals))
+        link: Link = vehicles
+        if hardware.degrade is not None:
+            link = Degraded(vehicles, vehicles, scenario, hardware.degrade)
+        return flight(scenario, request, link, vehicles, ratings, connections=connections)
+
+
+def flight(
+    scenario: Scenario,
+    request: Request,
+    link: Link,
+    clock: Clock,
+    ratings: tuple[Rating, ...] | None,
+    *,
+    connections: Sequence[Connection] = (),
+) -> int:
+    """Fly, record, show and report. connections: by which other commands may reach the flight. Exit code."""
+    with ExitStack() as stack:
+        live_ratings = request.supervision.live(stack, scenario, console.say)
+        folder = output_folder(request.out, request.name)
+        earlier = make_room(folder)
+        if earlier is not None:
+            console.say(f"an earlier recording is kept as {earlier}")
+        screen = console.stderr()
+        control = None
+        if connections:
+            ids = range(1, scenario.swarm.count + 1)
+            control = stack.enter_context(ControlSocket(connections, ids, console.say))
+        operator = stack.enter_context(
+            Operator(
+                lambda words: screen.print(words, highlight=False, markup=False),
+                words=tuple if control is None else control.take,
+                ratings=live_ratings,
+            )
+        )
+
+        def watching(flight: Flight) -> tuple[Display | ControlSocket, ...]:
+            display = Display(flight, screen, title=Path(request.name).stem)
+            return (display,) if control is None else (display, control)
+
+        summary = flown(
+            request.name,
+            scenario,
+            link,
+            clock,
+            seed=request.seed,
+            out=folder,
+            operator=operator,
+            watching=watching,
+            ratings=ratings,
+        )
+    _report(summary, folder, json=request.json)
+    if operator.interrupted:
+        return INTERRUPTED
+    return FLOWN if summary.completed else NOT_COMPLETED
+
+
+def _with_one_degraded(scenario: Scenario, system: int) -> Scenario:
+    """The scenario with this vehicle's behavioural fault and no other: the vehicles bring none along."""
+    try:
+        scenario = degrading(scenario, system)
+    except ValueError as error:
+        raise BadUsageError(f"--degrade {system}: {error}") from None
+    its = [fault for fault in scenario.fault if isinstance(fault, MotorDegradation) and fault.vehicle == system]
+    return Scenario.model_validate(scenario.model_dump() | {"fault": [fault.model_dump() for fault in its]})
+
+
+def _report(summary: Summary, folder: Path, *, json: bool) -> None:
+    if summary.problem is not None:
+        console.say(f"gcs: {summary.problem}")
+    if json:
+        console.write(summary.json())
+        return
+    lines = [verdict(summary), f"recording  {summary.recording}"]
+    if (folder / PICTURE).exists():
+        lines.append(f"picture    {(folder / PICTURE).resolve()}")
+    sys.stdout.write("\n".join(lines) + "\n")
