@@ -80,7 +80,7 @@ async def armed(client):
 
 
 async def velocities(client, settled):
-    """Velocity NED [m/s] over half a second or more, and what follows."""
+    """Some velocities NED [m/s], from half a second after the first that had `settled`."""
     await first(client.stream("position_velocity_ned"), lambda value: settled(velocity_of(value)))
     await asyncio.sleep(0.5)
     return [velocity_of(value) for value in await some(client.stream("position_velocity_ned"))]

@@ -81,7 +81,7 @@ async def telemetry(drone):
         "home": [home.latitude_deg, home.longitude_deg],
         "origin": [origin.latitude_deg, origin.longitude_deg],
         "height": position.relative_altitude_m,
-        "tilt": [attitude.roll_deg, attitude.pitch_deg],
+        "attitude": [attitude.roll_deg, attitude.pitch_deg, attitude.yaw_deg],
         "quaternion": [quaternion.w, quaternion.x, quaternion.y, quaternion.z],
         "volts": battery.voltage_v,
         "charge": battery.remaining_percent,

@@ -19,7 +19,7 @@ PATIENCE_S = 60.0
 FACTS = "facts: "
 """What the line begins with in which a client's script says what it saw, as JSON."""
 
-ONE_VEHICLE = """
+HEADED_EAST = """
 title = "one vehicle for somebody else's ground station"
 [swarm]
 rows = 1
@@ -28,8 +28,8 @@ leaders = [1]
 [mission]
 cruise_m_s = 1.5
 [[mission.leg]]
-task = "north"
-heading_deg = 0
+task = "east"
+heading_deg = 90
 length_m = 30
 """
 
@@ -61,7 +61,7 @@ def process(command, log, **options):
 def vehicle(autopilot, folder, *, speed=SPEED):
     """`fdm serve` with one vehicle; gives the port that it speaks to."""
     told = folder / "one.toml"
-    told.write_text(ONE_VEHICLE, encoding="utf-8")
+    told.write_text(HEADED_EAST, encoding="utf-8")
     port = free_port()
     command = [sys.executable, "-m", "fdm", "serve", str(told), "--to", f"udpout:{LOOPBACK}:{port}"]
     with process([*command, "--autopilot", autopilot, "--speed", f"{speed:g}"], folder / "vehicle.log"):

@@ -92,7 +92,7 @@ def set_to(console, name, value):
 
 
 def test_it_reads_parameters_changes_modes_and_flies_an_arducopter_from_arming_to_disarming(console):
-    """It sends one set-point for each `velocity` that is typed, in the body's frame: this one is headed north."""
+    """It sends one set-point for each `velocity` that is typed, in the body's frame: this one is headed east."""
     own = table("ardupilot")
     console.see(f"Received {len(own)} parameters")
     console.ask("param fetch", f"Received {len(own)} parameters")
@@ -109,12 +109,12 @@ def test_it_reads_parameters_changes_modes_and_flies_an_arducopter_from_arming_t
     until(lambda: told(console, "z") < -9.8)
     console.ask("disarm", "COMPONENT_ARM_DISARM: FAILED")
 
-    until(lambda: told(console, "vx") > CRUISE - WITHIN, meanwhile=lambda: console.type("velocity 3 0 0"))
+    until(lambda: told(console, "vy") > CRUISE - WITHIN, meanwhile=lambda: console.type("velocity 3 0 0"))
     for _ in range(5):
         console.type("velocity 3 0 0")
-        assert [told(console, field) for field in ("vx", "vy", "vz")] == pytest.approx([CRUISE, 0.0, 0.0], abs=WITHIN)
+        assert [told(console, field) for field in ("vx", "vy", "vz")] == pytest.approx([0.0, CRUISE, 0.0], abs=WITHIN)
     console.type("velocity 0 0 0")
-    until(lambda: abs(told(console, "vx")) < WITHIN)
+    until(lambda: abs(told(console, "vy")) < WITHIN)
 
     console.ask("land", "DO_LAND_START: UNSUPPORTED")
     console.ask("mode land", "Mode LAND")

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from client_flight import CRUISE
 from in_flight import flown
 
 from fdm.parameters import table
@@ -11,7 +12,6 @@ from fdm.world import SITE
 pytestmark = pytest.mark.wall_clock
 both = pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 
-CRUISE = 3.0  # m/s
 WITHIN = 0.1  # m/s
 
 VERSIONS = {"px4": [1, 16], "ardupilot": [4, 6]}
@@ -41,9 +41,9 @@ def test_it_learns_all_about_a_vehicle_on_the_ground_and_is_refused_what_cannot_
     for place in (facts.place, facts.home, facts.origin):
         assert place == pytest.approx([SITE.latitude_deg, SITE.longitude_deg], abs=1e-6)
     assert facts.height == pytest.approx(0.0, abs=0.1)
-    assert facts.tilt == pytest.approx([0.0, 0.0], abs=0.5)
-    assert abs(facts.quaternion[0]) == pytest.approx(1.0, abs=1e-3)
-    assert math.hypot(*facts.quaternion) == pytest.approx(1.0, abs=1e-4)
+    assert facts.attitude == pytest.approx([0.0, 0.0, 90.0], abs=0.5)
+    w, x, y, z = facts.quaternion
+    assert [w * z / abs(w), x, y] == pytest.approx([math.sqrt(0.5), 0.0, 0.0], abs=0.01)
     assert facts.volts == pytest.approx(16.8, abs=0.4)
     assert facts.charge == pytest.approx(100.0, abs=2.0)
     assert facts.satellites >= 6
