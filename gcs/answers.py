@@ -18,6 +18,7 @@ _COMMANDS: Mapping[int, str] = MappingProxyType(
         dialect.MAV_CMD_REQUEST_MESSAGE: "sending a message once",
     }
 )
+_ABOUT_MESSAGES = (dialect.MAV_CMD_SET_MESSAGE_INTERVAL, dialect.MAV_CMD_REQUEST_MESSAGE)
 _RESULTS: Mapping[int, str] = MappingProxyType(
     {
         dialect.MAV_RESULT_ACCEPTED: "accepted",
@@ -40,9 +41,10 @@ class Answer(NamedTuple):
     """MAV_RESULT."""
 
     @property
-    def accepted(self) -> bool:
-        """Done, or being done."""
-        return self.result in (dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_IN_PROGRESS)
+    def refused(self) -> bool:
+        """Neither done nor being done. A message that a vehicle does not have is nothing to worry about."""
+        agreed = self.result in (dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_IN_PROGRESS)
+        return not agreed and self.command not in _ABOUT_MESSAGES
 
     @property
     def words(self) -> str:

@@ -60,6 +60,9 @@ class Display:
         for system, severity, text in tick.swarm.words:
             if severity <= WARNING:
                 self._console.print(f"vehicle {system}: {text}", highlight=False, markup=False)
+        for answer in tick.swarm.answers:
+            if answer.refused:
+                self._console.print(answer.words, highlight=False)
         parts = parts_of(tick) or self._at_first
         for words in _news(self._parts, parts):
             self._console.print(f"{_clock(tick, self._flight)}  {words}", highlight=False)

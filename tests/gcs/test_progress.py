@@ -1,11 +1,13 @@
 """The flight on a terminal, and where there is none."""
 
+from dataclasses import replace
 from io import StringIO
 
 import pytest
 from flights import recorded
 from rich.console import Console
 
+from gcs.answers import Answer
 from gcs.events import Rating
 from gcs.flight import Flight
 from gcs.loop import fly
@@ -111,6 +113,16 @@ def test_who_takes_over_who_is_left_behind_and_who_comes_back_is_said_once(super
 
 def test_where_roles_stay_nothing_is_said_of_them(flight):
     assert "robot" not in shown(*flight, width=110)
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_a_command_that_was_refused_is_said_and_one_that_was_taken_is_not(flight, terminal):
+    decided, turns = flight
+    answers = (Answer(2, 400, 1), Answer(3, 400, 0), Answer(4, 511, 3))
+    turn = replace(turns[20], swarm=replace(turns[20].swarm, answers=answers))
+    screen = shown(decided, [turn], width=110, force_terminal=terminal, color_system=None)
+    assert screen.count("vehicle 2: arming or disarming rejected for now\n") == 1
+    assert not any(words in screen for words in ("accepted", "supported"))
 
 
 def test_before_a_vehicle_is_heard_it_says_so(flight):

@@ -343,12 +343,20 @@ def test_answers_to_somebody_else_are_not_ours(system, component):
     assert observe(FLEET, [said(ack)]).answers == ()
 
 
-@pytest.mark.parametrize(("result", "accepted"), [(0, True), (5, True), (1, False), (2, False), (3, False), (4, False)])
-def test_an_answer_says_who_took_what_and_how(result, accepted):
+@pytest.mark.parametrize(
+    ("result", "refused"), [(0, False), (5, False), (1, True), (2, True), (3, True), (4, True), (99, True)]
+)
+def test_an_answer_says_who_took_what_and_how(result, refused):
     (answer,) = observe(FLEET, [said(dialect.MAVLink_command_ack_message(22, result))]).answers
     assert (answer.system, answer.command, answer.result) == (2, 22, result)
-    assert answer.accepted is accepted
+    assert answer.refused is refused
     assert answer.words.startswith("vehicle 2: taking off ")
+
+
+@pytest.mark.parametrize("command", [511, 512])
+def test_a_message_that_a_vehicle_does_not_have_is_no_refusal(command):
+    (answer,) = observe(FLEET, [said(dialect.MAVLink_command_ack_message(command, 2))]).answers
+    assert not answer.refused
 
 
 def chunks(text, *, text_id=7, severity=4):
