@@ -45,11 +45,12 @@ def accuracy_m(craft: Craft) -> float:
     return max(RECEIVER_M, math.sqrt(2.0) * craft.noise.position_m)
 
 
-def pack_local(craft: Craft, moment: Moment) -> bytes:
+def pack_local(craft: Craft, time_s: float, measured: tuple[float, ...]) -> bytes:
     """Payload of LOCAL_POSITION_NED, from the estimator's origin: by hand, because it flies many times a second."""
-    north, east, down, *velocity = moment.measured
+    north, east, down, vn, ve, vd = measured
     origin_n, origin_e = craft.origin_ne
-    return pack_local_position(LocalPosition(moment.boot_ms, north - origin_n, east - origin_e, down, *velocity))
+    boot_ms = round(time_s * 1e3)
+    return pack_local_position(LocalPosition(boot_ms, north - origin_n, east - origin_e, down, vn, ve, vd))
 
 
 def _global_position(craft: Craft, moment: Moment) -> Any:

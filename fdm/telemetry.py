@@ -54,10 +54,9 @@ class Reporter:
 
     def report(self, message: int, pilot: Pilot, now: Situation, measured: tuple[float, ...]) -> bytes:
         """A frame with the vehicle's state; measured: (n, e, d, vn, ve, vd), SI, from the pad."""
-        moment = Moment(pilot, now, measured)
         if message == LOCAL_POSITION_NED:
-            return self.sender.frame(LOCAL_POSITION_NED, position_reports.pack_local(self._craft, moment))
-        return self.sender.pack(self._reports[message](self._craft, moment))
+            return self.sender.frame(message, position_reports.pack_local(self._craft, now.time_s, measured))
+        return self.sender.pack(self._reports[message](self._craft, Moment(pilot, now, measured)))
 
     def truth(self) -> bytes:
         """SIM_STATE: the state without noise."""
