@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gcs.swarm_frame import swarm_frame
+from gcs.swarm_frame import origin_of, swarm_frame
 from scenarios import load, offsets_ne
 
 NOWHERE = np.zeros(2)
@@ -71,3 +71,10 @@ def test_a_fleet_may_straddle_the_date_line():
     places = frame.to_ne(origin[:, 0], origin[:, 1])
     assert places.mean(axis=0) == pytest.approx([0, 0], abs=1e-6)
     assert places[1, 1] - places[0, 1] == pytest.approx(2e-5 * frame.metres_per_degree[1], rel=1e-6)
+
+
+@given(latitudes, longitudes, st.tuples(*[st.floats(-100, 100)] * 3))
+def test_the_origin_of_a_place_is_where_that_place_is_counted_from(latitude_deg, longitude_deg, position_ned):
+    place = pymap3d.ned2geodetic(*position_ned, latitude_deg, longitude_deg, 300.0)
+    back = pymap3d.geodetic2ned(*origin_of(*place, position_ned), latitude_deg, longitude_deg, 300.0)
+    assert back == pytest.approx((0, 0, 0), abs=5e-3)  # down is not quite the same direction 140 m away
