@@ -30,6 +30,7 @@ def test_it_lands_at_the_step_at_which_the_delay_is_over(after_steps):
 @pytest.mark.parametrize("silence_s", [0.3, 1.0, 2.5])
 def test_its_patience_is_a_parameter_that_a_client_may_set_in_flight(silence_s):
     flight = Flight().hover().offboard(NORTH, 1.0)
+    flight.endpoint.step(13)
     flight.send(setpoint(NORTH), parameter("COM_OF_LOSS_T", silence_s), parameter("COM_FAIL_ACT_T", 1.0))
     flight.endpoint.step(round(silence_s * 250) - 1)
     assert flight.pilot.mode is Mode.OFFBOARD

@@ -71,7 +71,7 @@ def test_whoever_is_flown_steers_until_silent():
     assert gate.inlet.refused == {"other sender": 3}
 
 
-def test_the_ignored_are_told_of_once_each():
+def test_the_ignored_are_told_of_once_for_each_who_steers():
     gate = Gate()
     gate.hand_in(OURS)
     words = [gate.hand_in(sender, time_s=0.1).words for sender in (THEIRS, THEIRS, (1, 2), THEIRS, (1, 2))]
@@ -84,6 +84,8 @@ def test_the_ignored_are_told_of_once_each():
     ]
     assert gate.taken(THEIRS, time_s=1.0)
     assert gate.hand_in(OURS, time_s=1.1).words == "Set-points of 255/190 ignored: 254/190 steers"
+    assert gate.taken(OURS, time_s=2.0)
+    assert gate.hand_in(THEIRS, time_s=2.1).words == "Set-points of 254/190 ignored: 255/190 steers"
 
 
 def test_while_none_are_flown_the_last_to_speak_is_the_one():
