@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from types import TracebackType
 
+import numpy as np
 from rich.console import Console, Group
 from rich.live import Live
 from rich.padding import Padding
@@ -17,6 +18,7 @@ from rich.text import Text
 from gcs.flight import Flight
 from gcs.flight_state import Phase
 from gcs.loop import Tick
+from gcs.telemetry import Flags
 from gcs.track import Parts, parts_of
 from wire.modes import mode_name
 
@@ -42,6 +44,7 @@ class Display:
         self._phase: Phase | None = None
         self._at_first = Parts(0.0, flight.scenario.swarm.leaders, ())
         self._parts = self._at_first
+        self._released = np.zeros(len(flight.ids), bool)
 
     def __enter__(self) -> Display:
         if self._live is not None:
@@ -64,9 +67,9 @@ class Display:
             if answer.refused:
                 self._console.print(answer.words, highlight=False)
         parts = parts_of(tick) or self._at_first
-        for words in _news(self._parts, parts):
+        for words in (*_news(self._parts, parts), *_in_other_hands(self._released, tick)):
             self._console.print(f"{_clock(tick, self._flight)}  {words}", highlight=False)
-        self._parts = parts
+        self._parts, self._released = parts, tick.state.released
         if self._live is None:
             if phase is not self._phase:
                 self._console.print(f"{_clock(tick, self._flight)}  {phase.value}", highlight=False)
@@ -101,7 +104,7 @@ class Display:
             heard = swarm.position_ns[row] > 0
             table.add_row(
                 str(system),
-                _part(system, self._parts),
+                _part(system, self._parts, released=bool(tick.state.released[row])),
                 _mode(bool(swarm.armed[row]), int(swarm.autopilot[row]), int(swarm.custom_mode[row])),
                 _number(north, "m"),
                 _number(east, "m"),
@@ -118,7 +121,9 @@ class Display:
         return table
 
 
-def _part(system: int, parts: Parts) -> Text:
+def _part(system: int, parts: Parts, *, released: bool) -> Text:
+    if released:
+        return Text("not ours", style="red")
     if system in parts.left_behind:
         return Text("left behind", style="yellow")
     return Text("leader" if system in parts.leaders else "follower")
@@ -135,6 +140,13 @@ def _news(before: Parts, now: Parts) -> Iterator[str]:
     for system in before.left_behind:
         if system not in now.left_behind:
             yield f"robot {system} is taken back"
+
+
+def _in_other_hands(before: Flags, tick: Tick) -> Iterator[str]:
+    """Vehicles that others took from us at this tick, and those that the operator took back."""
+    for row in np.flatnonzero(before != tick.state.released):
+        system, taken = tick.swarm.ids[row], tick.state.released[row]
+        yield f"vehicle {system} is not ours any more: nothing is sent to it" if taken else f"vehicle {system} is ours"
 
 
 def _waiting(tick: Tick) -> str:

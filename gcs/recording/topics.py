@@ -119,7 +119,7 @@ class SetpointTopic:
     asked: Table | None
     sent: Table | None
     verdict: Vector | None
-    """0 as asked, 1 slowed, 2 refused."""
+    """0 as asked, 1 slowed, 2 asked to stop (no number, or too late), 3 kept inside its fence, 4 sent nothing."""
     commanded: Vector | None
     """False for vehicles that were sent none."""
 

@@ -10,6 +10,7 @@ from rich.console import Console
 from gcs.answers import Answer
 from gcs.events import Rating
 from gcs.flight import Flight
+from gcs.hands import killed
 from gcs.loop import fly
 from gcs.progress import MOST_ROWS, Display
 from gcs.recording.reader import ticks
@@ -174,3 +175,16 @@ def test_of_a_large_fleet_the_first_are_shown_and_the_rest_counted():
     screen = shown(flight, kept.turns, force_terminal=True, width=110, height=60, color_system=None)
     assert last_picture(screen).count("not heard") == MOST_ROWS
     assert f"and {30 - MOST_ROWS} more" in screen
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_who_is_taken_from_us_is_said_once_and_shown(flight, terminal):
+    decided, turns = flight
+    middle = [turn for turn in turns if turn.diagnosis.mission_s >= 15.0][:3]
+    theirs = [replace(t, state=replace(t.state, hands=killed(t.state.hands, 3, t.number))) for t in middle[1:]]
+    screen = shown(decided, [middle[0], *theirs, middle[0]], width=110, force_terminal=terminal, color_system=None)
+    assert screen.count("vehicle 4 is not ours any more: nothing is sent to it") == 1
+    assert screen.count("vehicle 4 is ours\n") == 1
+    if terminal:
+        only = last_picture(shown(decided, [theirs[0]], width=110, force_terminal=True, color_system=None))
+        assert [line.split()[:3] for line in only.splitlines() if "not ours" in line] == [["4", "not", "ours"]]
