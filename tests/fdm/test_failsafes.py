@@ -42,6 +42,18 @@ def test_its_patience_is_a_parameter_that_a_client_may_set_in_flight(silence_s):
     assert flight.pilot.mode is Mode.LAND
 
 
+def test_a_shorter_patience_counts_at_once():
+    flight = Flight().hover().offboard(NORTH, 1.0)
+    flight.send(parameter("COM_OF_LOSS_T", 5.0))
+    flight.wait(0.6)
+    flight.endpoint.step(13)
+    flight.send(setpoint(NORTH), parameter("COM_OF_LOSS_T", 0.5))
+    flight.endpoint.step(124)
+    assert flight.pilot.mode is Mode.OFFBOARD
+    flight.endpoint.step(1)
+    assert flight.pilot.mode is Mode.HOLD
+
+
 @pytest.mark.parametrize(("stock", "silence_s", "then"), [(False, 0.5, Mode.LAND), (True, 1.0, Mode.RETURN)])
 def test_stock_failsafes_are_the_autopilots_own(stock, silence_s, then):
     flight = Flight(stock=stock).hover().offboard(NORTH, 1.0)
