@@ -22,6 +22,10 @@ from wire.modes import ARDUPILOT, PX4, mode_name
 HEARD, NOTHING = 0, 3
 """Exit codes."""
 STEP_NS = 100_000_000
+HEADS = (
+    "id", "autopilot", "type", "mode", "armed", "height", "speed", "battery",
+    "satellites", "accuracy", "from", "messages/s", "loss",
+)  # fmt: skip
 NO_SATELLITES = 255
 """What GPS_RAW_INT says where it does not know."""
 
@@ -144,19 +148,8 @@ def listen(live: Live, *, seconds: float, as_json: bool, console: Any, write: Ca
 
 
 def _show(found: list[Vehicle], live: Live, console: Any) -> None:
-    from rich.table import Table
-
-    table = Table(box=None, padding=(0, 1), header_style="dim")
-    for name in ("id", "autopilot", "type", "mode", "armed", "height", "speed", "battery"):
-        table.add_column(name, no_wrap=True)
-    for name in ("satellites", "accuracy", "from", "messages/s", "loss"):
-        table.add_column(name, no_wrap=True)
-    for vehicle in found:
-        table.add_row(*_cells(vehicle))
-    if found:
-        console.print(table)
-    else:
-        console.print("nobody is heard")
+    for line in _table([HEADS, *map(_cells, found)]) if found else ["nobody is heard"]:
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
     lines = [
         *(f"two vehicles call themselves {system}: give each an id of its own" for system in sorted(live.duplicates)),
         *(f"ground station {one.system}.{one.component} is heard from {one.address}" for one in live.stations),
@@ -167,6 +160,12 @@ def _show(found: list[Vehicle], live: Live, console: Any) -> None:
         lines.append(words)
     for line in lines:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
+
+
+def _table(rows: list[tuple[str, ...]]) -> list[str]:
+    """Columns as wide as their widest cell: nothing that names a vehicle is ever cut off."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
 
 
 def _cells(vehicle: Vehicle) -> tuple[str, ...]:
