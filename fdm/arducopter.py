@@ -1,16 +1,20 @@
 """ArduCopter's flight modes and failsafes, as pure functions. There is no radio, so modes that ask sticks sink.
 
-                          arm                NAV_TAKEOFF                height reached
-    GUIDED, disarmed ──────────► GUIDED, armed ──────────► GUIDED, climbing ──────────► GUIDED, holding
-                                                                 │ set-point               set-point │ ▲ silent for
-    LAND, RETURN: disarmed ◄──────────── LAND, RETURN            └────────► GUIDED, steered ◄────────┘ │ GUID_TIMEOUT
-       arming is refused     1 s on the    ▲ land, return, or ground station silent FS_GCS_TIMEOUT     │
-                             ground        └────────────────────── any of these ◄──────────────────────┘
+                       arm              NAV_TAKEOFF            height reached
+    GUIDED, disarmed ──────► on the ground ──────────► climbing ───────────────► holding
+                                                          │                       │   ▲
+                                                 set-point│              set-point│   │ set-points silent
+                                                          ▼                       ▼   │ for GUID_TIMEOUT
+                                                          └───────────────────► steered
+                          1 s on the ground
+    LAND, RETURN disarmed ◄────────────────── LAND, RETURN ◄── from any: land, return, or what FS_GCS_ENABLE says
+                                                               once the ground station is silent for FS_GCS_TIMEOUT
 
 It boots in STABILIZE. GUIDED is reported while it climbs, is steered, and holds: set-points that fall silent leave it
 in GUIDED, where it stops and stays. Set-points in other modes are ignored; in GUIDED one that comes before the vehicle
-has left the ground calls the take-off off, and none lifts it. LOITER, POSITION_HOLD, ALTITUDE_HOLD and STABILIZE read a
-throttle stick that nobody holds: they sink (a real STABILIZE would fall). BRAKE stops and stays.
+has left the ground calls the take-off off, and none lifts it. Disarmed in LAND or RETURN it cannot be armed before
+another mode is set. LOITER, POSITION_HOLD, ALTITUDE_HOLD and STABILIZE read a throttle stick that nobody holds: they
+sink (a real STABILIZE would fall). BRAKE stops and stays.
 
 https://ardupilot.org/copter/docs/ac2_guidedmode.html
 https://ardupilot.org/dev/docs/copter-commands-in-guided-mode.html

@@ -1,13 +1,15 @@
 """PX4's flight modes and failsafes, as pure functions. There is no radio: only the ground station steers.
 
-                 arm              take-off                 height reached
-    disarmed ───────────► HOLD ─────────────► TAKEOFF ───────────────────────► HOLD
-        ▲                 │ ▲ ▲                                                 │
-        │                 │ │ └─── set-points silent COM_OF_LOSS_T ───────┐     │ mode OFFBOARD,
-        │                 │ └───── ground station silent COM_DL_LOSS_T ─┐ │     │ set-points coming
-        │                 │ land, return, or COM_FAIL_ACT_T after a     │ │     ▼
-        │ 0.5 s on        ▼ silence what COM_OBL_RC_ACT, NAV_DLL_ACT say└─┴─ OFFBOARD
-        └ the ground ── LAND, RETURN ◄─────── land, return ─────────────────────┘
+                arm              take-off               height reached
+    disarmed ─────────► HOLD ───────────────► TAKEOFF ─────────────────► HOLD
+                                                                          │ mode OFFBOARD,
+                                                                          ▼ set-points coming
+                                                                       OFFBOARD
+                                                                          │ set-points silent for COM_OF_LOSS_T, or the
+                                       COM_OBL_RC_ACT or                  ▼ ground station (in any mode) COM_DL_LOSS_T
+             0.5 s on the ground       NAV_DLL_ACT say so
+    disarmed ◄───────────── LAND, RETURN ◄──────────────────────────── HOLD
+                                          COM_FAIL_ACT_T later
 
 Any mode may be asked for in any other. After a silence the vehicle stays in HOLD, LAND or RETURN, whatever set-points
 come, until it is told OFFBOARD again. An OFFBOARD set-point that climbs takes off from the ground, as PX4 does.
