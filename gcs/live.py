@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from gcs.link_quality import LinkQuality, Meter
 from gcs.messages import HEARTBEAT
-from gcs.routes import Routes, of_station
+from gcs.routes import IGNORED, Routes, of_station
 from wire.clock import WallClock
 from wire.connection import Connection
 from wire.frames import Frame
@@ -121,7 +121,8 @@ class Live:
         spoke = self._routes.peer(frame.system)
         refusal = self._routes.refusal(frame, peer)
         if refusal is not None:
-            self._refused[refusal] += 1
+            if refusal not in IGNORED:
+                self._refused[refusal] += 1
             return
         if spoke != peer:
             self._meters[frame.system] = Meter()

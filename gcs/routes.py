@@ -18,6 +18,8 @@ OTHER_SYSTEM = "other system"
 NOT_INTRODUCED = "no heartbeat yet"
 WRONG_ADDRESS = "wrong address"
 """Why a good frame is refused."""
+IGNORED = frozenset({OTHER_SYSTEM, NOT_INTRODUCED})
+"""Refusals that mean nothing: others fly too, and a vehicle may be heard in the middle of its second."""
 
 NO_VEHICLES = frozenset(
     {
