@@ -18,17 +18,16 @@ from gcs.telemetry import Swarm, observe
 from scenarios import Scenario
 from wire.modes import mode_name
 
-LISTEN_S = 10.0
-FIRST_S = 2.5
-"""Before arming: two heartbeats of everybody."""
+FIRST_S, LISTEN_S = 2.5, 10.0
+"""Two heartbeats of everybody, even if all have been heard before that; and the most."""
 
 
 def listen(live: Live, scenario: Scenario, *, as_json: bool, say: Callable[[str], None]) -> int:
     """Say which of a scenario's vehicles are heard within LISTEN_S; nothing is sent. 0 if all are, else 3."""
     swarm = Swarm.of(range(1, scenario.swarm.count + 1))
-    until_ns = live.now() + int(LISTEN_S * 1e9)
+    first_ns, until_ns = (live.now() + round(seconds * 1e9) for seconds in (FIRST_S, LISTEN_S))
     say(f"listening for {len(swarm.ids)} vehicles, sending nothing; --arm flies")
-    while live.now() < until_ns and not (swarm.heartbeat_ns > 0).all():
+    while live.now() < until_ns and not (live.now() >= first_ns and (swarm.heartbeat_ns > 0).all()):
         live.sleep_until(live.now() + scenario.time.period_ns)
         swarm = observe(swarm, live.receive())
     heard = [system for row, system in enumerate(swarm.ids) if swarm.heartbeat_ns[row] > 0]

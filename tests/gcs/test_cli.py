@@ -136,12 +136,31 @@ REFUSED = [
     (["run", "emergency", "--set", "nonsense"], "section.key=value"),
     (["fly", "emergency"], "--link"),
     (["fly", "emergency", "--link", "hello"], "'hello'"),
-    (["fly", "emergency", "--link", "tcp:127.0.0.1:1"], "tcp"),
+    (["fly", "emergency", "--link", "ftp:127.0.0.1:1"], "ftp is not a kind of link; allowed are udpin"),
+    (["fly", "emergency", "--link", "udpin:127.0.0.1:14999", "--link", "udp://127.0.0.1:14999"], "named twice"),
+    (["fly", "emergency", "--link", "serial:/dev/ttyNone:57600", "--arm", "--yes"], "6 vehicles at 10 Hz need 6 × "),
+    (["fly", "emergency", "--link", "udpin:127.0.0.1:14999", "--degrade", "7"], "--degrade 7: vehicle 7 cannot be"),
+    (["fly", "emergency", "--link", "udpin:127.0.0.1:14999", "--signing-key", "nowhere"], "signing key nowhere: "),
     (["fly", "emergency", "--link", "udpin:127.0.0.1:70000"], "65535"),
     (["fly", "emergency", "--link", "udpin:127.0.0.1:14999", "--arm"], "--yes"),
     (["fly", "emergency", "--link", "udpin:127.0.0.1:14999", "--speed", "0"], "--speed 0"),
     (["fly", "emergency", "--link", "udpin:127.0.0.1:14999", "--speed", "nan"], "--speed nan"),
     (["fly", "emergency", "--link", "udpin:127.0.0.1:14999", "--speed", "inf"], "--speed inf"),
+    (["vehicles"], "--link"),
+    (["vehicles", "--link", "hello"], "'hello'"),
+    (["vehicles", "--link", "udpin:127.0.0.1:14999", "--seconds", "0"], "--seconds 0"),
+    (["vehicles", "--link", "udpin:127.0.0.1:14999", "--seconds", "nan"], "--seconds nan"),
+    (["vehicles", "--link", "udpin:127.0.0.1:14999", "--signing-key", "nowhere"], "signing key nowhere: "),
+    (["land"], "--link"),
+    (["land", "--link", "hello"], "'hello'"),
+    (["land", "--link", "udpin:127.0.0.1:14999", "--vehicle", "0"], "--vehicle 0: must be a system id, 1 to 255"),
+    (["hold", "--link", "udpin:127.0.0.1:14999", "--vehicle", "256"], "--vehicle 256"),
+    (["hold", "--link", "udpin:127.0.0.1:14999", "--vehicle", "one"], '"one"'),
+    (["kill", "--link", "udpin:127.0.0.1:14999"], "needs --vehicle and --yes"),
+    (["kill", "--link", "udpin:127.0.0.1:14999", "--vehicle", "1"], "needs --vehicle and --yes"),
+    (["kill", "--link", "udpin:127.0.0.1:14999", "--yes"], "needs --vehicle and --yes"),
+    (["take-back", "--link", "udpin:127.0.0.1:14999"], "--vehicle"),
+    (["take-back", "--link", "udpin:127.0.0.1:14999", "--vehicle", "4"], "no flight of yours has this link"),
     (["reproduce", "--seeds", "0"], "--seeds 0"),
     (["reproduce", "--jobs", "0"], "--jobs 0"),
     (["compare"], "at least one"),
@@ -165,7 +184,9 @@ def test_bad_input_is_one_sentence_that_names_it_and_exit_code_2(gcs, tmp_path, 
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("words", ["run demo", "reproduce --seeds 1", "fly demo --link udpout:127.0.0.1:9 --arm --yes"])
+@pytest.mark.parametrize(
+    "words", ["run demo", "reproduce --seeds 1", "fly demo --link udpout:127.0.0.1:9 --arm --yes --speed 50"]
+)
 def test_a_folder_that_cannot_be_made_is_refused_before_anything_flies(gcs, tmp_path, words):
     (tmp_path / "file").write_text("in the way")
     for out in (tmp_path / "file", tmp_path / "file" / "below"):
@@ -292,7 +313,8 @@ def helped(*python):
 
 def test_help_names_every_command_and_imports_nothing_heavy():
     done, _ = helped("-X", "importtime")
-    assert all(name in done.stdout for name in ("run", "fly", "reproduce", "scenarios", "compare", "replay"))
+    commands = ("run", "fly", "vehicles", "land", "hold", "kill", "take-back", "reproduce", "scenarios", "compare")
+    assert all(name in done.stdout for name in (*commands, "experiment", "identify", "replay"))
     imported = {line.split("|")[-1].strip() for line in done.stderr.splitlines()}
     assert "gcs.cli" in imported
     for heavy in ("matplotlib", "jsbsim", "scipy", "numpy", "pydantic", "pymavlink", "joblib"):
