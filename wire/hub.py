@@ -51,6 +51,8 @@ class Hub:
         self._shut_until = 0.0
         """Strangers are not heard before this instant of the monotonic clock."""
         self._shut = False
+        self._to_read = 0
+        """Datagrams of strangers to be read though their time is up."""
         self._ready: list[Port] = []
         self._datagrams = Framer()
         self._streams: dict[Peer, StreamFramer] = {}
@@ -106,7 +108,11 @@ class Hub:
             yield from self._from_strangers(strangers, now)
 
     def know(self, peer: Peer) -> None:
-        """Give a peer of a listening socket a socket of its own, where it has none yet and one can be had."""
+        """Give a peer of a listening socket a socket of its own, where it has none yet and one can be had.
+
+        What it sent before waits in the listening socket, and is read before what comes to its own: out of order, the
+        signed would be taken for replayed.
+        """
         port = peer.port
         if not isinstance(port, UdpPort) or port not in self._listening or peer.address is None or peer in self._own:
             return
@@ -115,6 +121,7 @@ class Hub:
         except ConnectionRefused:  # it is heard on, among strangers
             return
         self._own[peer] = own
+        self._to_read = AT_ONCE
         self._known[own] = peer
         self._selector.register(own, selectors.EVENT_READ)
 
@@ -155,14 +162,16 @@ class Hub:
         """One datagram a port in turn, until none waits or time is up; then the door is shut for four times as long."""
         began = time.monotonic()
         spent = 0.0
-        while ports and spent < STRANGERS_AT_ONCE_S:
+        while ports and (spent < STRANGERS_AT_ONCE_S or self._to_read > 0):
             waiting = []
             for port in ports:
                 for data, sender in port.receive(1):
                     waiting.append(port)
                     yield from self._frames(Peer(port, sender), data, now())
+            self._to_read -= len(waiting)
             ports = waiting
             spent = time.monotonic() - began
+        self._to_read = 0
         self._shut_until = began + spent / STRANGERS_SHARE
         self._let_in(False)
 

@@ -107,6 +107,25 @@ def test_strangers_get_a_fifth_of_the_time_however_many_they_are():
         assert spent < (STRANGERS_SHARE + 0.1) * 0.5
 
 
+def test_what_a_peer_sent_before_it_was_known_is_read_before_what_it_sends_after():
+    hub, address = listening()
+    sender, sent = Sender(1, 1), []
+    with closing(hub), closing(bound()) as vehicle:
+        for place in range(200):
+            sent.append(sender.pack(dialect.MAVLink_heartbeat_message(2, 12, 0, place, 4, 3)))
+            vehicle.sendto(sent[-1], address)
+        hub.wait(0.1)
+        got = []
+        for peer, frame in hub.arrivals(time.monotonic_ns):
+            if not got:
+                hub.know(peer)
+                vehicle.sendto(sender.pack(dialect.MAVLink_heartbeat_message(2, 12, 0, 200, 4, 3)), address)
+                time.sleep(2 * STRANGERS_AT_ONCE_S)
+            got.append(frame.raw)
+        assert got == sent
+        assert len(heard(hub)) == 1
+
+
 def test_while_strangers_wait_outside_a_known_peer_is_heard_at_once():
     hub, address = listening()
     with closing(hub), closing(bound()) as vehicle, closing(bound()) as crowd:
