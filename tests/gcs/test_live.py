@@ -88,8 +88,12 @@ LOW = () if SOAK else ("swarm.altitude_m=4",)
 
 
 def flown_over_udp(autopilot, ports, folder):
+    """Six vehicles behind one port, or each behind its own and with a signing key."""
     port = free_row(6)
     options = [word for override in LOW for word in ("--set", override)]
+    if ports == "separate":
+        (folder / "key").write_text("swordfish")
+        options += ["--signing-key", folder / "key"]
     with vehicles("transit", port, *options, "--seed", "1", "--autopilot", autopilot, "--ports", ports):
         listening = port if ports == "shared" else f"{port}-{port + 5}"
         process = fly("transit", listening, *options, "--seed", "1", "--arm", "--yes", "--out", folder)
