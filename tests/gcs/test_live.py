@@ -1,9 +1,11 @@
 """The ground station and the vehicles as two processes over UDP; and the link and clock that make it so."""
 
+import os
 import signal
 import socket
 import subprocess
 import time
+import tty
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -337,6 +339,39 @@ def test_a_vehicle_not_heard_yet_is_spoken_to_only_where_we_are_to_speak_first()
         assert waiting.recv(2048) == b"to one"
         fleet.listen()
         assert [data for data, _ in fleet.received] == [b"to two"]
+
+
+@contextmanager
+def line(kind):
+    """(connection, the vehicles' end of it) of a byte stream: a file descriptor, or a socket that is called."""
+    if kind == "serial":
+        ours, theirs = os.openpty()
+        tty.setraw(ours)
+        yield Connection("serial", device=os.ttyname(theirs), bits_per_s=57_600), ours
+        os.close(ours)
+        os.close(theirs)
+    else:
+        with socket.create_server((HOST, 0)) as server:
+            yield Connection("tcp", *server.getsockname()), server
+
+
+@pytest.mark.wall_clock
+@pytest.mark.parametrize("kind", ["tcp", "serial"])
+def test_vehicles_behind_a_stream_share_it_and_are_spoken_to_first(kind):
+    with line(kind) as (connection, end), closing(Live([connection], (1, 2), speed=100)) as live:
+        assert live.speaks_first
+        near = end if kind == "serial" else end.accept()[0].detach()
+        live.send(2, b"hello")
+        assert os.read(near, 5) == b"hello"
+        beats = [Sender(system, 1).pack(dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3)) for system in (1, 2)]
+        os.write(near, b"noise" + beats[0] + beats[1][:9])
+        assert [frame.system for frame in after(live, 2.0)] == [1]
+        os.write(near, beats[1][9:])
+        assert [frame.system for frame in after(live, 2.0)] == [2]
+        live.send(1, b"to one")
+        assert os.read(near, 6) == b"to one"
+        if kind == "tcp":
+            os.close(near)
 
 
 @pytest.mark.wall_clock
