@@ -1,5 +1,7 @@
 """A flight whose own code fails: other code tells its vehicles to land; who only watches takes nothing with it."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import orjson
 import pytest
@@ -115,9 +117,10 @@ def test_each_is_told_ten_times_over_two_seconds_in_words_that_every_autopilot_u
 class Told:
     """A tick that tells who flies what."""
 
-    def __init__(self, autopilots):
+    def __init__(self, autopilots, released=()):
         self.swarm = Swarm.of(range(1, len(autopilots) + 1))
         self.swarm.autopilot[:] = autopilots
+        self.state = SimpleNamespace(released=np.isin(self.swarm.ids, released))
 
 
 def test_each_is_also_asked_for_the_landing_mode_of_its_own_autopilot():
@@ -132,6 +135,14 @@ def test_each_is_also_asked_for_the_landing_mode_of_its_own_autopilot():
     }
     px4 = PX4_MODES["land"]
     assert asked == {(1, 1, px4.main, px4.sub), (2, 1, ARDUCOPTER_MODES["land"], 0)}
+
+
+def test_one_that_a_pilot_has_is_left_to_the_pilot():
+    wire = Wire()
+    resort = LastResort(wire, wire, (1, 2, 3), say=str)
+    resort.tick(Told([12, 12, 3], released=(2,)))
+    resort.land()
+    assert {to for _, to, _ in wire.sent} == {1, 3}
 
 
 def test_one_that_cannot_be_reached_keeps_nobody_from_being_told():
