@@ -233,6 +233,13 @@ def test_a_ground_station_that_fell_silent_can_be_followed_by_another(monkeypatc
     with waiting(abreast(1)) as (server, address), calling(address) as (first, second):
         first.send(command(REQUEST, VERSION))
         turn_until(server, [first, second], lambda: first.all("AUTOPILOT_VERSION"))
+        speaking = time.monotonic() + 0.6
+        while time.monotonic() < speaking:
+            for client in (first, second):
+                client.send(command(REQUEST, VERSION))
+            server.turn()
+        second.listen()
+        assert second.heard == []
         silent = time.monotonic()
         while not second.heard:
             assert time.monotonic() - silent < 2.0
@@ -240,6 +247,7 @@ def test_a_ground_station_that_fell_silent_can_be_followed_by_another(monkeypatc
             server.turn()
             second.listen()
         assert time.monotonic() - silent > 0.25
+        assert {peer.address for peer in server._hub.known} == {second.udp.getsockname()}
         first.listen()
         first.heard.clear()
         turn_until(server, [first, second], lambda: second.all("HEARTBEAT"))
@@ -260,6 +268,8 @@ def test_a_crowd_at_the_port_does_not_stop_physics_nor_the_ground_station():
             behind = max(behind, server.behind_s)
         assert world.steps - steps == pytest.approx(4.0 * HZ, rel=0.1)
         assert behind < 0.2
+        for _ in range(20_000):  # more than the port has room for
+            crowd.udp.sendto(forged, address)
         client.send(command(REQUEST, VERSION))
         turn_until(server, [client], lambda: client.all("AUTOPILOT_VERSION"))
         crowd.listen()

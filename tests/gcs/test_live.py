@@ -292,6 +292,7 @@ def test_what_is_sent_goes_to_where_the_vehicle_speaks_from_and_before_that_nowh
         other.listen()
         assert [data for data, _ in one.received] == [b"to one", b"to one again"]
         assert [data for data, _ in other.received] == [b"to the other", b"to its new place"]
+        assert {peer.address[1] for peer in live._hub.known} == {other._socket.getsockname()[1]}
 
 
 @pytest.mark.wall_clock
