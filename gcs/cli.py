@@ -329,10 +329,10 @@ def main(words: Sequence[str] | None = None) -> None:
             result_action="return_value",
         )
     except CycloptsError as error:
-        sys.stderr.write(f"gcs: {error}\n")
+        console.say(f"gcs: {error}")
         code = BAD_INPUT
     except KeyboardInterrupt:
-        sys.stderr.write("gcs: interrupted\n")
+        console.say("gcs: interrupted")
         code = INTERRUPTED
     except BrokenPipeError:  # the reader of our stdout has gone
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

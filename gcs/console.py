@@ -27,10 +27,14 @@ def stdout() -> Any:
 
 
 def stderr() -> Any:
-    """For what goes on."""
+    """For what goes on. Where whoever read it has hung up it falls silent; rich would end the process."""
     from rich.console import Console
 
-    return Console(stderr=True)
+    class Patient(Console):
+        def on_broken_pipe(self) -> None:
+            self.quiet = True
+
+    return Patient(stderr=True)
 
 
 def asked(question: str) -> str | None:

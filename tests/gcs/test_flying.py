@@ -1,5 +1,6 @@
 """`gcs fly` with all that a real link may ask for: a key, a vehicle degraded on the way, and the operator's word."""
 
+import os
 import signal
 import socket
 import subprocess
@@ -85,3 +86,19 @@ def test_a_signed_flight_leaves_a_memory_beside_the_key_and_no_key_in_the_record
     assert {path.name for path in folder.iterdir()} >= {"ground-key", "ground-key.flies"}
     data = (folder / "run" / "run.mcap").read_bytes()
     assert b"correct horse" not in data
+
+
+def test_whoever_reads_the_progress_may_hang_up_and_the_flight_goes_on(tmp_path):
+    short = [word for override in SHORT for word in ("--set", override)]
+    reading, writing = os.pipe()
+    process = subprocess.Popen(
+        [GCS, "run", "demo", *short, "--json", "--out", tmp_path], stdout=subprocess.PIPE, stderr=writing
+    )
+    os.close(writing)
+    os.close(reading)
+    out, _ = process.communicate(timeout=60)
+    summary = orjson.loads(out)
+    assert process.returncode == 0
+    assert summary["problem"] is None
+    assert summary["heading_error_deg"] is not None
+    assert decide_again(tmp_path / "run.mcap").difference is None
