@@ -122,7 +122,7 @@ class Passage:
 def admit(asked_ned: Array, yaw: float, standing: Standing, limits: Limits, *, dt: float) -> Passage:
     """What is sent of what was asked, (N, 3) m/s, with this heading [rad]; dt: s between two ticks."""
     commanded = standing.ours & (standing.age_ns <= LOST_NS)
-    before = np.where(commanded[:, None], standing.before_ned, 0.0)
+    before = standing.before_ned
     meant = np.asarray((np.abs(asked_ned) <= ABSURD).all(axis=1))
     if limits.fenced:
         meant &= np.isfinite(standing.place_ned).all(axis=1) & np.isfinite(standing.velocity_ned).all(axis=1)

@@ -123,6 +123,21 @@ def test_a_pilot_who_stops_the_climb_is_not_asked_to_take_off_again():
     assert "vehicle 4 left the ground station's control (hold) while taking off" in log.end.problem
 
 
+def test_a_landing_that_somebody_begins_at_the_top_of_the_climb_is_his():
+    tick = AT[Phase.TAKE_CONTROL] - 1
+    log = Log(Fleet(happens={tick: pilot("land")}))
+    assert sent_after(log, 4, tick) == []
+    assert "vehicle 4 left the ground station's control (land) while taking off" in log.end.problem
+
+
+def test_a_vehicle_that_boots_again_before_it_was_armed_is_not_armed():
+    """What was read of its parameters was read before."""
+    tick = AT[Phase.CLIMB] + 5
+    log = Log(Fleet(deaf=(4,), happens={tick: lambda fleet: fleet.reboot(4)}))
+    assert sent_after(log, 4, tick) == []
+    assert log.end.problem == "vehicle 4 booted again while taking off"
+
+
 def test_a_vehicle_that_was_disarmed_on_the_ground_is_not_armed_again():
     """A hand may be near its rotors."""
     tick = AT[Phase.CLIMB] + 2
@@ -319,7 +334,7 @@ def test_a_tick_that_comes_two_periods_late_asks_nobody_to_move(late_s):
     else:
         assert not (verdict == REFUSED).any()
     assert log.end.problem is None
-    assert log.phases() == NOMINAL.phases()
+    assert log.first(Phase.LAND) == AT[Phase.LAND]
 
 
 @pytest.mark.parametrize("phase", [*BEFORE, Phase.MISSION], ids=by_name)
@@ -384,7 +399,7 @@ def test_a_vehicle_outside_its_fence_brings_all_down(place, lands):
 def test_a_vehicle_outside_the_fence_that_is_a_pilots_is_his_affair():
     there = blown(4, (60.0, 0.0, -10.0))
     log = Log(Fleet(happens={MIDDLE: pilot("position"), MIDDLE + 5: there}), **FENCE)
-    assert log.phases() == NOMINAL.phases()
+    assert log.first(Phase.LAND) == AT[Phase.LAND]
 
 
 @pytest.mark.parametrize("system", [1, 5])
