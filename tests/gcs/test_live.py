@@ -383,7 +383,7 @@ def test_loss_is_counted_for_each_vehicle_by_the_numbers_of_its_autopilots_frame
             fleet.beat((1, 2))
             if 20 <= place < 25:  # five frames of vehicle 1 never leave
                 fleet._senders[0].pack(dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))
-        after(live, 1.0)
+        after(live, 10.0)
     assert live.quality == {1: LinkQuality(received=150, lost=5), 2: LinkQuality(received=150)}
 
 
