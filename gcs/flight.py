@@ -206,7 +206,12 @@ class Flight:
         flying = self._obeying(state, swarm) & ~losses.down(swarm, self.scenario.swarm.altitude_m)
         diagnosis = self._overview(state, swarm)
         heard = flying & swarm.fresh(now_ns, within_ns=STALE_NS)
-        observation = Observation(diagnosis.position_ne, swarm.velocity_ned[:, :2], heard, diagnosis.trust, time_s)
+        beside = losses.beside_ne(
+            swarm, diagnosis.position_ne, heard, now_ns, altitude_m=self.scenario.swarm.altitude_m
+        )
+        observation = Observation(
+            diagnosis.position_ne, swarm.velocity_ned[:, :2], heard, diagnosis.trust, time_s, beside
+        )
         assert diagnosis.virtual is not None
         try:
             memory, decision = decide(state.memory, observation, diagnosis.virtual, self._settings)

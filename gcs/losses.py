@@ -5,10 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from gcs.flight_state import Phase
 from gcs.telemetry import Flags, Swarm
 
+Array = npt.NDArray[np.float64]
+
+KEEP_CLEAR_NS, FLIES_ON_NS = 10_000_000_000, 500_000_000
+"""So long the others keep apart from a vehicle that is not heard any more, and so long it flies as it last did."""
 DOWN_BELOW = 0.25
 """Of the altitude to be held: a vehicle lower than that in a mission has come down."""
 
@@ -16,6 +21,19 @@ DOWN_BELOW = 0.25
 def down(swarm: Swarm, altitude_m: float) -> Flags:
     """(N,) who is near the ground; False where nothing is known."""
     return np.asarray(-swarm.position_ned[:, 2] < DOWN_BELOW * altitude_m)
+
+
+def beside_ne(swarm: Swarm, position_ne: Array, heard: Flags, now_ns: int, *, altitude_m: float) -> Array | None:
+    """(N, 2) m where those are believed to be who take no part any more, (N,) not heard, and still fly; NaN for others.
+
+    A silent vehicle flies on until it misses its set-points, then it stops. None where there is nobody.
+    """
+    age_ns = now_ns - swarm.position_ns
+    astray = ~heard & swarm.armed & ~down(swarm, altitude_m) & (age_ns <= KEEP_CLEAR_NS)
+    if not astray.any():
+        return None
+    on_s = np.minimum(age_ns, FLIES_ON_NS)[:, None] / 1e9
+    return np.where(astray[:, None], position_ne + swarm.velocity_ned[:, :2] * on_s, np.nan)
 
 
 def how(swarm: Swarm, row: int, *, silent: bool, altitude_m: float) -> str:

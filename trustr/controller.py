@@ -82,6 +82,9 @@ class Observation:
     """(N,) in [0, 1]."""
     time_s: float = 0.0
     """Since mission start."""
+    beside_ne: Array | None = None
+    """(N, 2) m: where robots are thought to be that are not heard, NaN where nobody is: others keep apart from them.
+    None is nobody."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -161,9 +164,14 @@ def decide(
             c2=settings.c2,
             cap=settings.feedback_cap,
         )
+    close, where = around, position
+    if observation.beside_ne is not None:
+        silent = ~heard & np.isfinite(observation.beside_ne).all(1)
+        where = np.where(silent[:, None], observation.beside_ne, position)
+        close = neighbours(where, heard | silent, range_m=settings.range_m).without(roles.gone)
     command += separation(
-        around,
-        position,
+        close,
+        where,
         radius=settings.separation_radius,
         gain=settings.separation_gain,
         shunned=observation.trust < settings.threshold,

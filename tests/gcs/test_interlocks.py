@@ -1,18 +1,24 @@
 """What comes between a flight and its vehicles: other hands, operators, silence, a fence, a loop that stood still."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from obedient import EVERYBODY, PERIOD_S, PROTECTED, Fleet, Log
+from obedient import EVERYBODY, MODE, PERIOD_S, PROTECTED, START, Fleet, Log
 
+from gcs import losses
+from gcs.autopilots import Fleet as Autopilots
 from gcs.commands import Arm, ChangeMode, Kill, Land, SetVelocity, TakeOff
 from gcs.events import HOLD, LAND, kill, take_back
 from gcs.flight import RETRY_S, TOLD_S
 from gcs.flight_state import Phase
 from gcs.gate import FENCED, LATE_PERIODS, REFUSED, WITHHELD
-from gcs.hands import RETURNS_S
+from gcs.hands import RETURNS_S, killed
+from gcs.mission import plan
+from gcs.steering import Steering
 from gcs.watch import BREACH_M, STOOD_NS
+from scenarios import load
 
 NOMINAL = Log(Fleet())
 AT = {phase: NOMINAL.first(phase) for phase in Phase if phase is not Phase.HOLD}
@@ -182,6 +188,22 @@ def test_nobody_is_armed_where_preflight_refuses():
     assert "vehicle 3: COM_OBL_RC_ACT = 0" in log.end.problem
     assert log.phases() == [Phase.JOIN, Phase.DONE]
     assert not log.ticks_of(Arm)
+
+
+@pytest.mark.parametrize("how", ["released", "in another mode"])
+def test_steering_itself_sends_nothing_to_who_is_not_ours(how):
+    """Whoever asks it to."""
+    scenario = load("demo")
+    steering = Steering(scenario, plan(scenario), Autopilots(height_m=10.0, position_s=0.1), centre_ne=np.zeros(2))
+    swarm = Fleet().heard(0, START)
+    state = replace(NOMINAL.states[MIDDLE], start_ns=START, tick=0)
+    if how == "released":
+        state = replace(state, hands=killed(state.hands, 3, 0))
+    else:
+        swarm = replace(swarm, custom_mode=np.where(np.arange(6) == 3, MODE["position"], swarm.custom_mode))
+    _, commands, told = steering.send(state, swarm, START, np.ones((6, 3)), NOMINAL.diagnoses[MIDDLE])
+    assert [to for to, _ in commands] == OTHERS
+    assert told.verdict[3] == WITHHELD
 
 
 # --- taken back by the operator
@@ -433,3 +455,43 @@ def test_a_word_lost_for_a_moment_is_no_event():
     log = Log(Fleet(silent={4: (MIDDLE, MIDDLE + 5)}))
     assert log.end.problem is None
     assert (weights(log, MIDDLE + 6)[[0, 1, 2, 4, 5], 3] > 0).all()
+
+
+# --- who takes no part is still in the way
+
+
+def closest(log, system, since):
+    """m, horizontal, between one vehicle and the nearest other at each tick: the fleet's own places."""
+    places = np.array([d.position_ne for d in log.diagnoses[since : AT[Phase.LAND]]])
+    apart = np.hypot(*np.moveaxis(places - places[:, [system - 1]], 2, 0))
+    return np.delete(apart, system - 1, axis=1).min(axis=1)
+
+
+def test_the_swarm_keeps_clear_of_a_vehicle_that_a_pilot_holds_in_its_way():
+    """Vehicle 2 hovers where vehicle 3 is about to fly, which would pass it at 0.63 m if it did not heed it."""
+
+    def hovers(fleet):
+        fleet.pilot(2, "position")
+        fleet.set("position_ned", 2, (4.6 + 2.25, 5.3 + 7.5, -10.0))  # north and east of the pads' origin
+
+    log = Log(Fleet(happens={MIDDLE: hovers}))
+    assert (weights(log, MIDDLE + 5)[[0, 2, 3, 4, 5], 1] == 0).all()
+    assert closest(log, 2, MIDDLE + 1).min() > 0.7
+
+
+def test_a_silent_vehicle_is_thought_to_fly_on_for_half_a_second_and_is_forgotten_after_ten():
+    fleet = Fleet().heard(0, START)
+    armed = replace(fleet, armed=np.ones(6, bool), velocity_ned=np.tile((1.0, 2.0, 0.0), (6, 1)))
+    up = replace(armed, position_ned=fleet.position_ned - np.array([0.0, 0.0, 10.0]))
+    heard, place = np.arange(6) != 3, fleet.position_ned[:, :2]
+
+    def thought(swarm, age_s):
+        return losses.beside_ne(swarm, place, heard, START + round(age_s * 1e9), altitude_m=10.0)
+
+    for age_s, on_s in ((0.3, 0.3), (0.5, 0.5), (2.0, 0.5), (10.0, 0.5)):
+        there = thought(up, age_s)
+        assert there[3] == pytest.approx(place[3] + on_s * np.array([1.0, 2.0]))
+        assert np.isnan(np.delete(there, 3, axis=0)).all()
+    assert thought(up, 10.1) is None
+    assert thought(armed, 0.4) is None  # it has come down
+    assert thought(replace(up, armed=np.zeros(6, bool)), 0.4) is None

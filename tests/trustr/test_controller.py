@@ -54,7 +54,31 @@ def observations(draw):
         velocity_ne=six(2, st.floats(-3, 3) | wild),
         heard=draw(arrays(bool, 6)),
         trust=six(1, st.floats(0, 1))[:, 0],
+        beside_ne=six(2, st.floats(-40, 40) | wild) if draw(st.booleans()) else None,
     )
+
+
+@profiles
+def test_robots_keep_apart_from_one_that_is_not_heard_where_it_is_thought_to_be(profile):
+    """And it counts for nothing else: half a metre beside robot 2 it moves robot 2 alone, away from it."""
+    chosen = SETTINGS[profile]
+    seen = replace(in_formation(chosen), heard=np.arange(6) != 4)
+    there = np.full((6, 2), nan)
+    there[4] = seen.position_ne[1] + np.array([0.0, 0.5])
+    nobody, beside = (decide(replace(seen, beside_ne=place), REST, chosen) for place in (None, there))
+    push = beside.velocity_ne - nobody.velocity_ne
+    assert push[1] == pytest.approx([0.0, -chosen.separation_gain * (chosen.separation_radius - 0.5)])
+    assert not push[[0, 2, 3, 4, 5]].any()
+    assert (beside.graph.dense(beside.weights) == nobody.graph.dense(nobody.weights)).all()
+
+
+@given(observations())
+def test_whoever_is_heard_is_where_he_says_and_nowhere_else(observation):
+    heard = replace(observation, heard=np.ones(6, bool))
+    known = np.isfinite(heard.position_ne).all(1) & np.isfinite(heard.velocity_ne).all(1)
+    there = None if heard.beside_ne is None else np.where(known[:, None], heard.beside_ne, nan)
+    one, other = (decide(replace(heard, beside_ne=place), VIRTUAL, SETTINGS["paper"]) for place in (there, None))
+    assert (one.velocity_ne == other.velocity_ne).all()
 
 
 def in_formation(chosen, *, velocity=(0.0, 0.0), trust=1.0):
@@ -119,11 +143,13 @@ def test_names_of_robots_do_not_matter(profile, rule, observation, random):
     order = list(range(6))
     random.shuffle(order)
     chosen = replace(flown_by(rule, profile), hand_over=False)  # of two equally near, the lower id takes over
-    renamed = Observation(
-        *(
-            value[order]
-            for value in (observation.position_ne, observation.velocity_ne, observation.heard, observation.trust)
-        )
+    renamed = replace(
+        observation,
+        position_ne=observation.position_ne[order],
+        velocity_ne=observation.velocity_ne[order],
+        heard=observation.heard[order],
+        trust=observation.trust[order],
+        beside_ne=None if observation.beside_ne is None else observation.beside_ne[order],
     )
     leaders = np.array([order.index(leader) for leader in chosen.leaders])
     command = decide(renamed, VIRTUAL, replace(chosen, offset_ne=chosen.offset_ne[order], leaders=leaders)).velocity_ne
