@@ -76,8 +76,8 @@ class Swarm:
     """(N,) horizontal accuracy that the receiver claims; infinite where it claims none, NaN until told."""
     parameters: tuple[Mapping[str, float], ...]
     """(N,) those that a flight depends on, as far as told; what is no number is not kept."""
-    not_finite: int
-    """Positions and velocities refused because they were no numbers."""
+    impossible: int
+    """Positions and velocities refused: no numbers, or none that a multicopter has."""
     pieces: tuple[Piece | None, ...]
     """(N,) texts of which more is to come."""
     words: tuple[tuple[int, int, str], ...]
@@ -111,7 +111,7 @@ class Swarm:
             battery=np.full(n, np.nan),
             accuracy_m=np.full(n, np.nan),
             parameters=({},) * n,
-            not_finite=0,
+            impossible=0,
             pieces=(None,) * n,
             words=(),
             answers=(),
@@ -142,7 +142,7 @@ class _Draft:
         self.boot_ms: list[int] = swarm.boot_ms.tolist()
         self.positions: dict[int, tuple[int, LocalPosition]] = {}
         """Row → (time of arrival [ns], the newest that arrived)."""
-        self.not_finite = swarm.not_finite
+        self.impossible = swarm.impossible
         self.words: list[tuple[int, int, str]] = []
         self.answers: list[Answer] = []
 
@@ -180,7 +180,7 @@ class _Draft:
             changed["words"] = tuple(self.words)
         if self.answers or self._swarm.answers:
             changed["answers"] = tuple(self.answers)
-        return replace(self._swarm, not_finite=self.not_finite, **changed)
+        return replace(self._swarm, impossible=self.impossible, **changed)
 
     def _now(self, name: str, changed: Mapping[str, Any]) -> Any:
         return changed.get(name, getattr(self._swarm, name))
@@ -204,14 +204,23 @@ class _Draft:
 
 def _local_position(draft: _Draft, row: int, frame: Frame) -> None:
     position = unpack_local_position(frame.payload)
-    if not math.isfinite(sum(position)):  # a sum of finite float32s is finite in doubles
-        draft.not_finite += 1
+    if not _possible(position):
+        draft.impossible += 1
         return
     late_ms = draft.boot_ms[row] - position.time_boot_ms
     if 0 <= late_ms < REBOOTED_MS:
         return
     draft.boot_ms[row] = position.time_boot_ms
     draft.positions[row] = frame.time_ns, position
+
+
+FASTEST, FARTHEST = 100.0, 100_000.0
+"""m/s and m from the origin: beyond them a report tells nothing, and whoever keeps to it is silent."""
+
+
+def _possible(position: LocalPosition) -> bool:
+    """Whether all numbers are finite, and such as vehicles have: a norm that is NaN is below no bound."""
+    return math.hypot(*position[4:7]) <= FASTEST and math.hypot(*position[1:4]) <= FARTHEST
 
 
 REBOOTED_MS = 2000

@@ -173,23 +173,28 @@ def test_frames_may_come_in_one_tick_or_in_two(order, split):
 # --- what is no number
 
 
-@pytest.mark.parametrize("value", [nan, inf, -inf])
+@pytest.mark.parametrize("value", [nan, inf, -inf, 3e38, -1.1e5])
 @pytest.mark.parametrize("axis", range(6))
-def test_a_position_or_velocity_that_is_no_number_is_refused_and_counted(value, axis):
+def test_a_position_or_velocity_that_no_vehicle_has_is_refused_and_counted(value, axis):
     numbers = [1.0] * 6
     numbers[axis] = value
     known = observe(FLEET, [position(boot_ms=100)])
     swarm = observe(known, [position(boot_ms=200, place=numbers[:3], velocity=numbers[3:])] * 2)
-    assert swarm.not_finite == known.not_finite + 2
+    assert swarm.impossible == known.impossible + 2
     assert swarm.position_ned[1].tolist() == [1, 2, -10]
     assert (swarm.boot_ms[1], swarm.position_ns[1]) == (100, NOW)
+
+
+@pytest.mark.parametrize(("speed", "refused"), [(100.0, 0), (-100.0, 0), (100.1, 1), (-100.1, 1)])
+def test_a_hundred_metres_a_second_is_the_fastest_that_is_believed(speed, refused):
+    assert observe(FLEET, [position(boot_ms=100, velocity=(0.0, speed, 0.0))]).impossible == refused
 
 
 def test_refusals_are_counted_over_the_whole_flight():
     swarm = FLEET
     for tick in range(5):
         swarm = observe(swarm, [position(boot_ms=tick, place=(nan, 0.0, 0.0))])
-    assert swarm.not_finite == 5
+    assert swarm.impossible == 5
 
 
 def test_a_battery_that_is_not_measured_stays_unknown():
