@@ -28,7 +28,9 @@ from gcs.gate import (
     admit,
 )
 from gcs.messages import Encoder
-from scenarios import load
+from gcs.mission import plan, run_up
+from scenarios import load, offsets_ne
+from scenarios.fence import reach_m
 
 DT, N = 0.1, 6
 LIMITS = Limits(speed=5.0, acceleration=10.0)
@@ -279,6 +281,17 @@ def test_a_scenarios_limits_are_the_gates():
     fenced = load("transit", overrides=["limits.fence.radius_m=70", "limits.speed_m_s=4"])
     assert Limits.of(fenced) == Limits(4.0, 10.0, radius=70.0)
     assert Limits.of(fenced).fenced
+
+
+@pytest.mark.parametrize("name", ["demo", "emergency", "transit"])
+@pytest.mark.parametrize("run_up_s", [0.0, 4.0])
+def test_how_far_a_fence_reckons_that_a_mission_goes_is_how_far_its_plan_does(name, run_up_s):
+    scenario = load(name, overrides=[f"mission.run_up_s={run_up_s}"])
+    legs, cruise = plan(scenario).segments, scenario.mission.cruise_m_s
+    begins = run_up(cruise, run_up_s, run_up_s)[0] * legs[0].velocity_ne / cruise if run_up_s else np.zeros(2)
+    corners = [-begins, *(leg.start_ne for leg in legs), legs[-1].end_ne]
+    places = np.array([corner + begins + place for corner in corners for place in offsets_ne(scenario)])
+    assert reach_m(scenario) == pytest.approx(np.hypot(*places.T).max())
 
 
 # --- who is sent anything at all
