@@ -24,7 +24,8 @@ fly: setup
 	$(BIN)/gcs compare $(RUNS)/average $(RUNS)/trust-r --out $(RUNS)/comparison.png
 
 test: setup
-	$(BIN)/pytest --numprocesses $(JOBS)
+	$(BIN)/pytest --numprocesses $(JOBS) -m "not alone"
+	$(BIN)/pytest -m alone
 
 check: setup
 	$(BIN)/ruff check .
@@ -32,7 +33,8 @@ check: setup
 	$(BIN)/mypy
 
 soak: setup
-	TRUSTR_PROFILE=soak $(BIN)/pytest --numprocesses $(JOBS) --timeout 7200
+	TRUSTR_PROFILE=soak $(BIN)/pytest --numprocesses $(JOBS) --timeout 7200 -m "not alone"
+	TRUSTR_PROFILE=soak $(BIN)/pytest --timeout 7200 -m alone
 
 bench: setup
 	$(BIN)/python -m tests.benchmarks
