@@ -14,7 +14,14 @@ import pymap3d
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from fdm.craft import EPOCH_US, Craft, Moment, Report
-from wire.payloads import LocalPosition, pack_local_position
+from wire.payloads import (
+    IGNORE_YAW,
+    IGNORE_YAW_RATE,
+    POSITION_ONLY,
+    VELOCITY_ONLY,
+    LocalPosition,
+    pack_local_position,
+)
 
 SATELLITES, DILUTION = 14, 0.7
 """Under an open sky."""
@@ -24,9 +31,6 @@ FIXED_BELOW_M, FLOAT_BELOW_M = 0.05, 0.5
 """Errors of a receiver with carrier-phase corrections, by the kind of its fix."""
 FULL_ROTOR_SPEED = 1000.0
 """rad/s, params/max-rotor-speed of aircraft/quad."""
-VELOCITY_ONLY, POSITION_ONLY = 0x0DC7, 0x0DF8
-"""type_mask: what else there is, ignore."""
-IGNORE_YAW, IGNORE_YAW_RATE = 0x0400, 0x0800
 UNKNOWN_16 = 0xFFFF
 
 MEASUREMENTS = frozenset(

@@ -13,18 +13,14 @@ from scenarios import MotorDegradation, Scenario
 from scenarios.degradation import degrade
 from wire.frames import CRC, HEADER_2, MAGIC_2, Frame, sealed
 from wire.payloads import (
+    IGNORE_LEVEL_VELOCITY,
     SET_POSITION_TARGET_LOCAL_NED,
     PositionTarget,
     pack_position_target,
     unpack_position_target,
 )
 
-STANDS_STILL = 1e-9
-"""m/s, horizontal: a set-point above it is one to move."""
-
 _MESSAGE = SET_POSITION_TARGET_LOCAL_NED.to_bytes(3, "little")
-_VELOCITY_IGNORED = 0x08 | 0x10
-"""Of type_mask: vx or vy does not count."""
 _FLOAT32_ROOM = 1.0 - 2.0**-22
 """What is this much shorter stays below its bound when it is rounded."""
 
@@ -76,7 +72,7 @@ class Degraded:
         return self._link.rejected
 
     def _watch_for_the_start(self, target: PositionTarget) -> None:
-        if self._start_ns is None and math.hypot(target.vx, target.vy) > STANDS_STILL:
+        if self._start_ns is None and target.moves_sideways:
             self._start_ns = self._clock.now() + self._run_up_ns
 
     def _bent(self, frame: bytes, target: PositionTarget) -> bytes:
@@ -114,7 +110,7 @@ def _velocity_target(frame: bytes) -> PositionTarget | None:
     if frame[0] != MAGIC_2 or frame[2] or frame[7:HEADER_2] != _MESSAGE:
         return None
     target = unpack_position_target(frame[HEADER_2:-CRC])
-    if target.type_mask & _VELOCITY_IGNORED or not math.isfinite(target.vx + target.vy):
+    if target.type_mask & IGNORE_LEVEL_VELOCITY or not math.isfinite(target.vx + target.vy):
         return None
     return target
 

@@ -6,12 +6,20 @@ types first. Tests hold every one to pymavlink's bytes. Page: https://mavlink.io
 
 from __future__ import annotations
 
+import math
 import struct
 from typing import NamedTuple
 
 LOCAL_POSITION_NED = 32
 SET_POSITION_TARGET_LOCAL_NED = 84
 SIM_STATE = 108
+
+IGNORE_LEVEL_VELOCITY, FORCE, IGNORE_YAW, IGNORE_YAW_RATE = 0x0018, 0x0200, 0x0400, 0x0800
+"""Bits of type_mask: vx and vy do not count; what is set is a force; yaw, and its rate, do not count."""
+VELOCITY_ONLY, POSITION_ONLY = 0x0DC7, 0x0DF8
+"""type_mask: what else there is, ignore."""
+STANDS_STILL = 1e-9
+"""m/s: a horizontal set-point above it asks a vehicle to move."""
 
 _LOCAL_POSITION = struct.Struct("<I6f")
 _SET_POSITION_TARGET = struct.Struct("<I11fHBBB")
@@ -49,6 +57,11 @@ class PositionTarget(NamedTuple):
     target_system: int
     target_component: int
     coordinate_frame: int
+
+    @property
+    def moves_sideways(self) -> bool:
+        """Whether its velocity is more than up and down."""
+        return math.hypot(self.vx, self.vy) > STANDS_STILL
 
 
 class SimState(NamedTuple):
