@@ -35,9 +35,6 @@ TRUTH_PERIOD_S = 0.1
 
 SKIPS = 0.05
 """m above the ground, where legs that bounce or scrape count as standing: contacts come and go at low step rates."""
-STANDS_STILL = 1e-9
-"""m/s: a horizontal set-point above it asks the vehicle to move."""
-
 
 TYPE_AT = 4
 """Where MAV_TYPE is in the payload of a HEARTBEAT."""
@@ -301,8 +298,7 @@ class Endpoint:
             self._say(Severity.WARNING, words)
         if setpoint is None:
             return
-        north, east, _ = setpoint.velocity_ned
-        if self.first_motion_step is None and math.hypot(north, east) > STANDS_STILL:
+        if self.first_motion_step is None and target.moves_sideways:
             self.first_motion_step = self.vehicle.steps
         self._pilot = self._machine.hear(self._pilot, setpoint)
         self._be_patient()

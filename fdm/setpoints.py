@@ -14,11 +14,14 @@ from typing import NamedTuple
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from fdm.modes import ON_TIME, Setpoint, Vector
-from wire.payloads import PositionTarget
+from wire.payloads import FORCE, IGNORE_YAW, IGNORE_YAW_RATE, VELOCITY_ONLY, PositionTarget
 
-VELOCITY_MASKS = frozenset({0x0DC7, 0x09C7, 0x05C7, 0x0FC7})
-"""type_mask of a velocity set-point: alone, with yaw, with yaw rate, alone as MAVProxy writes it (force bit)."""
-IGNORE_YAW, IGNORE_YAW_RATE = 0x0400, 0x0800
+VELOCITY_MASKS = frozenset(
+    {VELOCITY_ONLY, VELOCITY_ONLY & ~IGNORE_YAW, VELOCITY_ONLY & ~IGNORE_YAW_RATE, VELOCITY_ONLY | FORCE}
+)
+"""type_mask of a velocity set-point: alone, with yaw, with yaw rate, alone as MAVProxy writes it."""
+FASTEST = 1000.0
+"""m/s: no vehicle flies faster, and what asks for more is no velocity."""
 TURNED = frozenset({dialect.MAV_FRAME_BODY_NED, dialect.MAV_FRAME_BODY_OFFSET_NED})
 """Frames whose velocity is forward, right, down, and whose yaw counts from the vehicle's."""
 CLOCK = 2**32
@@ -86,7 +89,8 @@ class Inlet:
             return "frame"
         yaw = 0.0 if target.type_mask & IGNORE_YAW else target.yaw
         yaw_rate = 0.0 if target.type_mask & IGNORE_YAW_RATE else target.yaw_rate
-        return "" if all(map(math.isfinite, (target.vx, target.vy, target.vz, yaw, yaw_rate))) else "number"
+        flies = math.hypot(target.vx, target.vy, target.vz) <= FASTEST  # no NaN is
+        return "" if flies and math.isfinite(yaw) and math.isfinite(yaw_rate) else "number"
 
     def _refuse(self, reason: str, words: str = "") -> Verdict:
         self.refused[reason] += 1

@@ -3,9 +3,10 @@
 import math
 
 import pytest
-from clients import ACCEPTED, ALONE, BODY_NED, MODE, OFFBOARD, WITH_YAW, Flight, Station, setpoint
+from clients import ACCEPTED, ALONE, BODY_NED, MODE, OFFBOARD, SET_INTERVAL, WITH_YAW, Flight, Station, setpoint
 from hypothesis import given
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from fdm.modes import Mode, Setpoint
 from fdm.setpoints import CLOCK, Inlet
@@ -42,6 +43,8 @@ class Gate:
         ({"frame": 0}, "frame"),
         ({"velocity": (math.nan, 0.0, 0.0)}, "number"),
         ({"velocity": (0.0, 0.0, math.inf)}, "number"),
+        ({"velocity": (3.4e38, 0.0, 0.0)}, "number"),
+        ({"velocity": (800.0, 0.0, -800.0)}, "number"),
         ({"mask": WITH_YAW, "yaw": math.nan}, "number"),
     ],
 )
@@ -133,6 +136,21 @@ def test_a_set_point_carries_what_its_mask_says_in_the_worlds_frame():
 
 
 # On a vehicle
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_no_set_point_is_too_huge_to_be_told_of_turned_by_the_heading(autopilot):
+    flight = Flight(yaw=math.radians(60.0), autopilot=autopilot)
+    flight = flight.hover() if autopilot == "px4" else flight.guided()
+    assert flight.ask(SET_INTERVAL, dialect.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED, 20_000) == ACCEPTED
+    for velocity in ((3.4e38, 3.4e38, 0.0), (-3.4e38, 3.4e38, 3.4e38), (999.0, 0.0, 0.0), (700.0, -700.0, 0.0)):
+        flight.stream(0.2, velocity, frame=BODY_NED)
+        if autopilot == "px4":
+            flight.ask(MODE, 1, *OFFBOARD)
+        flight.stream(0.1, velocity, frame=BODY_NED)
+    assert flight.endpoint.refused_setpoints == {"number": 12}
+    flown = flight.last("POSITION_TARGET_LOCAL_NED")
+    assert math.hypot(flown.vx, flown.vy) == pytest.approx(math.hypot(700.0, 700.0))
 
 
 def rival(flight, velocity):
