@@ -118,12 +118,12 @@ def vehicles(
 
     def command() -> int:
         from gcs.links import LISTENS, opened, understood
-        from gcs.vehicles import listen
+        from gcs.vehicles import list_heard
 
         if not 0.0 < seconds < math.inf:
             raise BadUsageError(f"--seconds {seconds}: must be a number above 0")
         with opened(understood(link), None, purpose=LISTENS, signing_key=signing_key) as live:
-            return listen(live, seconds=seconds, as_json=json, console=console.stdout(), write=console.write)
+            return list_heard(live, seconds=seconds, as_json=json, console=console.stdout(), write=console.write)
 
     return guarded(command)
 

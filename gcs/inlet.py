@@ -6,8 +6,8 @@ import socket
 from functools import partial
 from types import TracebackType
 
+from gcs.clients import CLIENTS, Conversation, Lines
 from gcs.events import Rating
-from gcs.lines import CLIENTS, Conversation, Lines
 from gcs.ratings import RatingsError, parse
 
 HOST = "127.0.0.1"

@@ -27,8 +27,8 @@ from typing import Any
 import numpy as np
 import orjson
 
+from gcs.clients import CLIENTS, Conversation, Lines
 from gcs.events import HOLD, LAND, killed, taken_back
-from gcs.lines import CLIENTS, Conversation, Lines
 from gcs.loop import Tick
 from gcs.telemetry import NEVER
 from wire.connection import Connection

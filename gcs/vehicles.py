@@ -119,7 +119,7 @@ def height_of(swarm: Swarm) -> float | None:
     return _rounded(-float(swarm.position_ned[0, 2]))
 
 
-def listen(live: Live, *, seconds: float, as_json: bool, console: Any, write: Callable[[bytes], None]) -> int:
+def list_heard(live: Live, *, seconds: float, as_json: bool, console: Any, write: Callable[[bytes], None]) -> int:
     """Hear for so long, or until Ctrl-C, and say who was there; sends nothing. 0 if anybody was, else 3."""
     ear = Ear()
     until_ns = live.now() + round(seconds * 1e9)

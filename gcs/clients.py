@@ -1,4 +1,4 @@
-"""Lines from other programs while flying: bytes in, what they mean and answers out; nothing here waits.
+"""Other programs that say something while a flight goes on: lines in, what they mean and answers out; nobody waits.
 
 Once a tick the flight takes what has come. What a client may have in memory is bounded both ways: of one that sends
 more than it may, or does not read its answers, no more is read until there is room.
