@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from gcs.events import LAND, Rating
 from gcs.inlet import HOST, Inlet
-from gcs.lines import BUFFER, CLIENTS, LINE, LINES_A_TICK, Conversation
+from gcs.clients import BUFFER, CLIENTS, LINE, LINES_A_TICK, Conversation
 from gcs.lockstep import Lockstep
 from gcs.operator import Operator
 from gcs.ratings import RatingsError, parse, written
