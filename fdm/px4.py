@@ -11,9 +11,10 @@
     disarmed ◄───────────── LAND, RETURN ◄──────────────────────────── HOLD
                                           COM_FAIL_ACT_T later
 
-Any mode may be asked for in any other. After a silence the vehicle stays in HOLD, LAND or RETURN, whatever set-points
-come, until it is told OFFBOARD again. An OFFBOARD set-point that climbs takes off from the ground, as PX4 does.
-A ground station that was never heard cannot be lost.
+Any mode may be asked for in any other, and disarmed: what was told TAKEOFF or OFFBOARD does so as soon as it is armed,
+as clients that arm last expect. After a silence the vehicle stays in HOLD, LAND or RETURN, whatever set-points come,
+until it is told OFFBOARD again. An OFFBOARD set-point that climbs takes off from the ground, as PX4 does. A ground
+station that was never heard cannot be lost.
 
 https://docs.px4.io/main/en/flight_modes/offboard.html
 https://docs.px4.io/main/en/config/safety.html
@@ -69,19 +70,21 @@ def boot() -> Pilot:
 
 
 def arm(pilot: Pilot, now: Situation, rules: Rules) -> Outcome:
-    """Start the rotors: in OFFBOARD, where that was set before, else in HOLD."""
+    """Start the rotors: in TAKEOFF or OFFBOARD, where that was set before, else in HOLD."""
     if pilot.armed:
         return Outcome(pilot)
     if now.time_s < READY_AFTER:
         return refuse(pilot, Result.REJECTED, "Arming denied: sensors are settling")
     if station_silent(pilot, now, rules):
         return refuse(pilot, Result.REJECTED, "Arming denied: no ground station is heard")
-    mode = Mode.OFFBOARD if pilot.mode is Mode.OFFBOARD else Mode.HOLD
+    mode = pilot.mode if pilot.mode in (Mode.TAKEOFF, Mode.OFFBOARD) else Mode.HOLD
     if mode is Mode.OFFBOARD and over(silent_at(pilot, rules), now):
         return refuse(pilot, Result.REJECTED, "Arming denied: Offboard without set-points")
     armed = Pilot(
         armed=True,
         mode=mode,
+        climbing=mode is Mode.TAKEOFF,
+        anchor_ned=pilot.anchor_ned if mode is Mode.TAKEOFF else None,
         setpoint=pilot.setpoint,
         yaw=now.yaw,
         home_ned=(now.position_ned[0], now.position_ned[1], 0.0),
@@ -100,8 +103,6 @@ def disarm(pilot: Pilot, now: Situation, *, force: bool) -> Outcome:
 
 def take_off(pilot: Pilot, now: Situation, rules: Rules, height: float | None) -> Outcome:
     """Climb straight up to `height` [m above home]; by itself to MIS_TAKEOFF_ALT, or stay where that is lower."""
-    if not pilot.armed:
-        return refuse(pilot, Result.REJECTED, "Take-off denied: arm first")
     north, east, down = now.position_ned
     if height is None:
         height = max(rules.takeoff_height_m or 0.0, -down)
@@ -109,7 +110,7 @@ def take_off(pilot: Pilot, now: Situation, rules: Rules, height: float | None) -
         return refuse(pilot, Result.REJECTED, "Take-off denied: altitude is below home")
     anchor = north, east, -height
     return Outcome(
-        pilot._replace(mode=Mode.TAKEOFF, climbing=True, anchor_ned=anchor, loss=None),
+        pilot._replace(mode=Mode.TAKEOFF, climbing=pilot.armed, anchor_ned=anchor, loss=None),
         words=((Severity.INFO, f"Takeoff to {height:.1f} meters above home"),),
     )
 

@@ -33,7 +33,7 @@ def test_it_learns_all_about_a_vehicle_on_the_ground_and_is_refused_what_cannot_
     assert (facts.version, facts.unique_id) == (VERSIONS[autopilot], 1)
     if autopilot == "ardupilot":
         assert facts.arming_too_early == "FAILED"
-    assert facts.take_off_disarmed == {"px4": "COMMAND_DENIED", "ardupilot": "FAILED"}[autopilot]
+    assert facts.take_off_disarmed == {"px4": None, "ardupilot": "FAILED"}[autopilot]
     assert facts.offboard_without_setpoint == "NO_SETPOINT_SET"
 
     assert facts.health == [True, True, True]

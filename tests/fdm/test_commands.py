@@ -189,6 +189,21 @@ def test_it_may_be_armed_in_offboard_while_set_points_come():
     assert -flight.position[2] > 3.0
 
 
+def test_a_client_may_ask_for_the_take_off_first_and_arm_then():
+    flight = ready()
+    nothing = math.nan
+    altitude = PLACE.altitude_m + 5.0
+    assert flight.ask(TAKE_OFF, -1, 0, 0, nothing, nothing, nothing, altitude) == ACCEPTED
+    flight.wait(2.0)
+    assert flight.position == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
+    assert flight.last("HEARTBEAT").custom_mode == 4 << 16 | 2 << 24
+    assert not flight.last("HEARTBEAT").base_mode & 128
+    assert flight.ask(ARM, 1) == ACCEPTED
+    flight.wait(8.0)
+    assert -flight.position[2] == pytest.approx(5.0, abs=0.3)
+    assert flight.pilot.mode is Mode.HOLD
+
+
 def test_disarmed_it_never_moves_whatever_is_asked():
     flight = ready()
     for number, params in ((MODE, (CUSTOM, 4, 2)), (TAKE_OFF, (0,) * 6 + (500,)), (RETURN, ()), (LAND, ())):

@@ -167,9 +167,9 @@ def test_arming_in_the_first_second_is_refused_in_words_and_sys_status_says_when
 def test_refusals_come_with_words():
     flight = Flight()
     flight.wait(1.2)
-    flight.ask(TAKE_OFF, 0, 0, 0, 0, 0, 0, 500)
+    flight.ask(TAKE_OFF, 0, 0, 0, 0, 0, 0, PLACE.altitude_m - 1.0)
     flight.ask(MODE, 1, *OFFBOARD)
-    assert flight.words() == ["Take-off denied: arm first", "Offboard denied: no set-points are coming"]
+    assert flight.words() == ["Take-off denied: altitude is below home", "Offboard denied: no set-points are coming"]
 
 
 # Streams and requests

@@ -124,15 +124,33 @@ def test_it_is_not_armed_after_its_ground_station_is_gone(heard_s, agreed):
     assert agreed or outcome.words[0][1] == "Arming denied: no ground station is heard"
 
 
-@pytest.mark.parametrize(
-    ("pilot", "height", "word"),
-    [(Pilot(), 10.0, "arm first"), (flying(), 0.0, "below home"), (flying(), -300.0, "below home")],
-)
-def test_a_take_off_is_refused_disarmed_and_downwards(pilot, height, word):
+@pytest.mark.parametrize("pilot", [Pilot(), flying()])
+@pytest.mark.parametrize("height", [0.0, -300.0])
+def test_a_take_off_downwards_is_refused(pilot, height):
     outcome = px4.take_off(pilot, standing(20.0), RULES, height)
     assert outcome.result is REJECTED
     assert outcome.pilot == pilot
-    assert word in outcome.words[0][1]
+    assert "below home" in outcome.words[0][1]
+
+
+def test_a_take_off_that_is_asked_for_before_arming_begins_with_it():
+    told = px4.take_off(Pilot(), standing(20.0), RULES, 12.0)
+    assert (told.result, told.pilot.armed, told.pilot.mode) == (ACCEPTED, False, Mode.TAKEOFF)
+    assert px4.advance(told.pilot, standing(20.5), RULES).pilot == told.pilot
+    armed = px4.arm(told.pilot, standing(21.0), RULES).pilot
+    assert (armed.armed, armed.mode, armed.climbing, armed.anchor_ned) == (True, Mode.TAKEOFF, True, (3.0, 4.0, -12.0))
+    assert px4.velocity(armed, standing(21.0), RULES) == (0.0, 0.0, -RULES.takeoff_m_s)
+
+
+@pytest.mark.parametrize("between", [Mode.HOLD, Mode.LAND, None])
+def test_a_take_off_that_was_called_off_before_arming_is_forgotten(between):
+    pilot = px4.take_off(Pilot(), standing(20.0), RULES, 12.0).pilot
+    if between is None:
+        pilot = px4.disarm(pilot, standing(20.5), force=False).pilot
+    else:
+        pilot = px4.set_mode(pilot, standing(20.5), RULES, between).pilot
+    armed = px4.arm(pilot, standing(21.0), RULES).pilot
+    assert (armed.mode, armed.climbing, armed.anchor_ned) == (Mode.HOLD, False, None)
 
 
 @pytest.mark.parametrize(
