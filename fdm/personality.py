@@ -42,10 +42,7 @@ class Personality:
 
     def mode_of(self, main: int, sub: int) -> Mode | None:
         """The mode that param2 and param3 of DO_SET_MODE name; None where it is none of ours."""
-        return self.mode_numbered(main << 16 | sub << 24 if self.mode_has_parts else main)
-
-    def mode_numbered(self, custom_mode: int) -> Mode | None:
-        """The mode that a HEARTBEAT would show so."""
+        custom_mode = main << 16 | sub << 24 if self.mode_has_parts else main
         return next((mode for mode, number in self.custom_modes.items() if number == custom_mode), None)
 
 
@@ -65,6 +62,9 @@ PX4 = Personality(
             dialect.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
             dialect.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 1.0,
             dialect.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,
+            dialect.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
+            dialect.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: 0.5,
+            dialect.MAVLINK_MSG_ID_GPS_RAW_INT: 1.0,
             dialect.MAVLINK_MSG_ID_ATTITUDE: 1.0,
             dialect.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 1.0,
             dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 1.0,

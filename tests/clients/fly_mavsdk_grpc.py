@@ -27,7 +27,11 @@ async def main(port, autopilot):
     await drone.action.set_takeoff_altitude(HEIGHT)
     for name in ("position", "position_velocity_ned", "landed_state"):
         await getattr(system.telemetry, f"set_rate_{name}")(RATE_HZ)
-    say(await fly(drone))
+    facts = {}
+    if autopilot == "px4":  # this binding asks for it once, and then waits for a stream that ArduCopter does not have
+        home = await first(drone.stream("home"))
+        facts["home"] = [home.latitude_deg, home.longitude_deg]
+    say(facts | await fly(drone))
 
 
 asyncio.run(main(*sys.argv[1:]))

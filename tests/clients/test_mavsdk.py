@@ -79,4 +79,6 @@ def test_it_flies_a_vehicle_from_arming_to_disarming(autopilot, tmp_path):
 @both
 def test_its_binding_over_grpc_flies_a_vehicle_from_arming_to_disarming(autopilot, tmp_path):
     facts = flown("fly_mavsdk_grpc.py", autopilot=autopilot, folder=tmp_path)
+    if autopilot == "px4":
+        assert facts.home == pytest.approx([SITE.latitude_deg, SITE.longitude_deg], abs=1e-6)
     check(facts, autopilot, holds_in="LOITER" if autopilot == "ardupilot" else "HOLD")

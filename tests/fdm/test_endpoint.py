@@ -188,7 +188,7 @@ def test_a_stream_comes_at_the_rate_that_was_asked_for(rate_hz):
 
 
 @pytest.mark.parametrize(
-    ("kind", "message", "default_s"), [("ATTITUDE", ATTITUDE, 1), ("GPS_GLOBAL_ORIGIN", GPS_ORIGIN, 0)]
+    ("kind", "message", "default_s"), [("ATTITUDE", ATTITUDE, 1), ("VFR_HUD", dialect.MAVLINK_MSG_ID_VFR_HUD, 0)]
 )
 def test_a_stream_can_be_turned_off_and_back_to_its_default(kind, message, default_s):
     flight = Flight()

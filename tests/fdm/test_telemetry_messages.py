@@ -446,8 +446,11 @@ def test_unasked_arducopter_only_beats_and_px4_tells_slowly_what_a_person_needs(
     beats = [message.get_type() for message in Wired("ardupilot").wait(4.0)]
     assert beats == ["HEARTBEAT"] * 4
     told = [message.get_msgId() for message in Wired("px4").wait(4.0)]
-    each_second = {HEARTBEAT, SYS_STATUS, EXTENDED, ATTITUDE, LOCAL, GLOBAL}
-    assert {kind: told.count(kind) for kind in set(told)} == dict.fromkeys(each_second, 4) | {BATTERY: 2}
+    each_second = {HEARTBEAT, SYS_STATUS, EXTENDED, ATTITUDE, LOCAL, GLOBAL, GPS_RAW}
+    every_other = {BATTERY, HOME, ORIGIN}
+    assert {kind: told.count(kind) for kind in set(told)} == dict.fromkeys(each_second, 4) | dict.fromkeys(
+        every_other, 2
+    )
 
 
 @both
