@@ -28,6 +28,7 @@ from clients import (
     TAKE_OFF,
     UNSUPPORTED,
     VERSION,
+    VFR_HUD,
     WITH_YAW,
     WITH_YAW_RATE,
     Flight,
@@ -187,9 +188,7 @@ def test_a_stream_comes_at_the_rate_that_was_asked_for(rate_hz):
     assert times == [step * 4 for step in steps]
 
 
-@pytest.mark.parametrize(
-    ("kind", "message", "default_s"), [("ATTITUDE", ATTITUDE, 1), ("VFR_HUD", dialect.MAVLINK_MSG_ID_VFR_HUD, 0)]
-)
+@pytest.mark.parametrize(("kind", "message", "default_s"), [("ATTITUDE", ATTITUDE, 1), ("VFR_HUD", VFR_HUD, 0)])
 def test_a_stream_can_be_turned_off_and_back_to_its_default(kind, message, default_s):
     flight = Flight()
     counts = []
