@@ -106,7 +106,7 @@ class Flight:
         state, kills = self._kill(state, swarm)
         state, commands, diagnosis = self._phases[state.phase](state, swarm, now_ns)
         if state.tick % self.scenario.time.ticks(1.0) == 0:
-            commands = commands + [(system, Beat()) for system in self.ids]
+            commands = commands + [(system, Beat()) for system in self.ids] + self._listen(state, swarm, now_ns)
         state = replace(state, tick=state.tick + 1, now_ns=now_ns)
         return state, kills + commands, replace(diagnosis, ratings=said)
 
@@ -144,18 +144,20 @@ class Flight:
         """(N,) who flies our set-points, and nobody else's."""
         return np.asarray(self._fleet.obeying(swarm) & ~state.released)
 
+    def lacking(self, swarm: Swarm, now_ns: int) -> tuple[str, ...]:
+        """Whom a flight still waits for before it takes off, and for what; empty where it may."""
+        rows = range(len(swarm.ids))
+        said = ((swarm.ids[row], what) for row in rows for what in self._fleet.lacking(swarm, row, now_ns))
+        return preflight.by_vehicles(said)
+
     def _join(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
-        missing = [row for row in range(len(swarm.ids)) if not self._fleet.known(swarm, row)]
-        if not missing:
+        lacking = self.lacking(swarm, now_ns)
+        if not lacking:
             return self._cleared(state, swarm, now_ns)
         if (state.tick - state.phase_tick) * self._period_s > JOIN_S:
-            verb = "was" if len(missing) == 1 else "were"
-            who = losses.vehicles([swarm.ids[row] for row in missing])
-            lacking = ((swarm.ids[row], what) for row in missing for what in self._fleet.lacking(swarm, row))
-            told = "; ".join(preflight.by_vehicles(lacking))
-            problem = f"{who} {verb} not heard, or not ready to arm, within {JOIN_S:g} s, for lack of: {told}"
+            problem = f"not every vehicle was ready to arm within {JOIN_S:g} s, for lack of: {'; '.join(lacking)}"
             return self._land(failed(state, problem, Phase.DONE), swarm, now_ns)
-        return self._ask(state, swarm, lambda row: self._fleet.next_to_know(swarm, row))
+        return self._ask(state, swarm, lambda row: self._fleet.next_to_know(swarm, row, now_ns))
 
     def _cleared(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
         """Everything is known: nobody is armed if anything speaks against it."""
@@ -168,7 +170,7 @@ class Flight:
         return self._climb(replace(entered(state, Phase.CLIMB), frame=frame, shift_ne=shift), swarm, now_ns)
 
     def _climb(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
-        if all(self._fleet.hovering(swarm, row) for row in range(len(swarm.ids))):
+        if self._fleet.hovering(swarm).all():
             return self._take_control(entered(state, Phase.TAKE_CONTROL), swarm, now_ns)
         return self._ask(state, swarm, lambda row: _some(self._fleet.next_to_fly(swarm, row)))
 
@@ -275,6 +277,13 @@ class Flight:
     def _told(self, state: FlightState) -> bool:
         """Heartbeats have had the time to show what this phase asked for."""
         return (state.tick - state.phase_tick) * self._period_s >= TOLD_S
+
+    def _listen(self, state: FlightState, swarm: Swarm, now_ns: int) -> Commands:
+        """Ask vehicles in the air again for positions that come too seldom: that request may have been lost."""
+        if state.phase in (Phase.JOIN, Phase.DONE):
+            return []
+        asked = ((row, self._fleet.next_to_hear(swarm, row, now_ns)) for row in range(len(swarm.ids)))
+        return [(swarm.ids[row], again) for row, again in asked if again is not None and not state.released[row]]
 
     def _kill(self, state: FlightState, swarm: Swarm) -> tuple[FlightState, Commands]:
         """Stop the rotors of those whom the operator said it of, again and again until they are seen to stand."""

@@ -131,11 +131,8 @@ def killed(hands: Hands, row: int, tick: int) -> Hands:
 
 def _doing(swarm: Swarm, duty: Integers, fleet: Fleet, ours: Flags, landing: Flags) -> Flags:
     """(N,) who does its duty, as far as heartbeats show."""
-    climbs = np.zeros(len(swarm.ids), bool)
-    for row in np.flatnonzero((duty == Duty.TAKE_OFF) & swarm.armed & ours):
-        climbs[row] = fleet.next_to_fly(swarm, int(row)) is None
     does: dict[Duty, Callable[[], Flags]] = {
-        Duty.TAKE_OFF: lambda: climbs,
+        Duty.TAKE_OFF: lambda: ours & fleet.climbing(swarm),
         Duty.OBEY: lambda: fleet.obeying(swarm),
         Duty.HOLD: lambda: ours & ~landing,
         Duty.LAND: lambda: landing,

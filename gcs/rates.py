@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from gcs import messages
-from gcs.autopilots import ardupilot, px4
+from gcs.autopilots.protocol import SLOW_S
 from scenarios import Scenario
 from wire.connection import Connection
 from wire.frames import CRC, HEADER_2, SIGNATURE
@@ -76,10 +76,7 @@ def positions_per_tick(connections: Iterable[Connection], scenario: Scenario, *,
 
 def _load(*, signed: bool) -> _Load:
     beats = 2 * _frame(messages.HEARTBEAT, signed=signed) / BEAT_S
-    slow = max(
-        sum(_frame(message, signed=signed) / interval_s for message, interval_s in streams)
-        for streams in (px4.SLOW_S, ardupilot.SLOW_S)
-    )
+    slow = sum(_frame(message, signed=signed) / interval_s for message, interval_s in SLOW_S)
     return _Load(
         setpoint=_frame(SET_POSITION_TARGET_LOCAL_NED, signed=signed),
         position=_frame(messages.LOCAL_POSITION_NED, signed=signed),

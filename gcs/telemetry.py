@@ -47,6 +47,10 @@ class Swarm:
     """(N,) when position and velocity arrived, on the ground station's clock."""
     boot_ms: Integers
     """(N,) the vehicle's own time of them: older ones that arrive late are dropped."""
+    doubted_ms: Integers
+    """(N,) the same of one that came far too late, or from a vehicle that booted again; −1 where there is none."""
+    interval_s: Array
+    """(N,) between two of them over the last second or so, by the vehicle's own clock; NaN until there were two."""
     origin: Array
     """(N, 3) latitude and longitude [degrees] and altitude [m] of each vehicle's own origin; NaN until told."""
     home_m: Array
@@ -96,6 +100,8 @@ class Swarm:
             origin_down=np.full(n, np.nan),
             position_ns=np.full(n, NEVER),
             boot_ms=np.full(n, -1),
+            doubted_ms=np.full(n, -1),
+            interval_s=np.full(n, np.nan),
             origin=np.full((n, 3), np.nan),
             home_m=np.full(n, np.nan),
             home_down=np.zeros(n),
@@ -140,6 +146,8 @@ class _Draft:
         self._swarm = swarm
         self._copies: dict[str, Any] = {}
         self.boot_ms: list[int] = swarm.boot_ms.tolist()
+        self.doubted_ms: list[int] = swarm.doubted_ms.tolist()
+        self.interval_s: list[float] = swarm.interval_s.tolist()
         self.positions: dict[int, tuple[int, LocalPosition]] = {}
         """Row → (time of arrival [ns], the newest that arrived)."""
         self.impossible = swarm.impossible
@@ -180,7 +188,8 @@ class _Draft:
             changed["words"] = tuple(self.words)
         if self.answers or self._swarm.answers:
             changed["answers"] = tuple(self.answers)
-        return replace(self._swarm, impossible=self.impossible, **changed)
+        doubted_ms = np.array(self.doubted_ms, np.int64)
+        return replace(self._swarm, impossible=self.impossible, doubted_ms=doubted_ms, **changed)
 
     def _now(self, name: str, changed: Mapping[str, Any]) -> Any:
         return changed.get(name, getattr(self._swarm, name))
@@ -199,6 +208,7 @@ class _Draft:
             "origin_down": down,
             "position_ns": position_ns,
             "boot_ms": np.array(self.boot_ms),
+            "interval_s": np.array(self.interval_s),
         }
 
 
@@ -207,11 +217,24 @@ def _local_position(draft: _Draft, row: int, frame: Frame) -> None:
     if not _possible(position):
         draft.impossible += 1
         return
-    late_ms = draft.boot_ms[row] - position.time_boot_ms
-    if 0 <= late_ms < REBOOTED_MS:
-        return
-    draft.boot_ms[row] = position.time_boot_ms
+    before_ms, now_ms = draft.boot_ms[row], position.time_boot_ms
+    if now_ms <= before_ms:
+        doubted_ms = draft.doubted_ms[row]
+        draft.doubted_ms[row] = now_ms if before_ms - now_ms >= REBOOTED_MS else -1
+        if not 0 <= doubted_ms < now_ms < doubted_ms + REBOOTED_MS:
+            return
+        before_ms = doubted_ms
+    draft.interval_s[row] = _interval_s(draft.interval_s[row], before_ms, now_ms)
+    draft.boot_ms[row], draft.doubted_ms[row] = now_ms, -1
     draft.positions[row] = frame.time_ns, position
+
+
+def _interval_s(before_s: float, before_ms: int, now_ms: int) -> float:
+    """Between two reports, after one more of them: a mean in which the last second weighs most."""
+    if before_ms < 0:
+        return math.nan
+    apart_s = (now_ms - before_ms) / 1e3
+    return apart_s if math.isnan(before_s) else before_s + min(1.0, apart_s) * (apart_s - before_s)
 
 
 FASTEST, FARTHEST = 100.0, 100_000.0
@@ -224,7 +247,8 @@ def _possible(position: LocalPosition) -> bool:
 
 
 REBOOTED_MS = 2000
-"""A vehicle whose own clock is this far back was not reordered on the way: it has booted again."""
+"""A report so much older than the last was hardly overtaken on the way: if the next one goes on from it, not from the
+last, the vehicle has booted again."""
 
 
 def _heartbeat(draft: _Draft, row: int, frame: Frame) -> None:

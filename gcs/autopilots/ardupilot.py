@@ -10,17 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcs import messages
-from gcs.autopilots.protocol import ON_GROUND, TAKING_OFF, UNKNOWN, at_height, in_modes, may_arm, missing
+from gcs.autopilots.protocol import ON_GROUND, SLOW_S, TAKING_OFF, UNKNOWN, at_height, in_modes, may_arm, missing
 from gcs.commands import Arm, ChangeMode, Command, Land, RequestMessage, RequestStream, TakeOffAboveHome
 from gcs.telemetry import Flags, Swarm
 from wire.modes import ARDUCOPTER_MODES
-
-SLOW_S: tuple[tuple[int, float], ...] = (
-    (messages.ATTITUDE, 1.0),
-    (messages.SYS_STATUS, 1.0),
-    (messages.EXTENDED_SYS_STATE, 1.0),
-)
-"""Message id and interval of what is shown and recorded now and then: ArduPilot streams nothing unasked."""
 
 ESTIMATES = 0x33F
 """EKF_STATUS_FLAGS: attitude, both velocities, relative, absolute and predicted position. Without them no GUIDED."""
@@ -34,13 +27,10 @@ class ArduCopter:
 
     height_m: float
     """Above each vehicle's home."""
-    position_s: float
-    """How often each vehicle tells its position and velocity."""
 
     def streams(self) -> tuple[Command, ...]:
-        """Whatever we read."""
-        wanted = ((messages.LOCAL_POSITION_NED, self.position_s), *SLOW_S)
-        return tuple(RequestStream(*stream) for stream in wanted)
+        """Whatever we read: ArduPilot streams nothing unasked."""
+        return tuple(RequestStream(*stream) for stream in SLOW_S)
 
     def asked_once(self, swarm: Swarm, row: int) -> tuple[Command, ...]:
         """What is asked of all, and whether its estimator is there yet."""
@@ -52,17 +42,21 @@ class ArduCopter:
 
     def next_to_fly(self, swarm: Swarm, row: int) -> Command | None:
         """Towards hovering at height. After a landing the mode is LAND, in which nobody can be armed."""
-        if not swarm.armed[row] and not may_arm(swarm, row):
-            return None
-        if swarm.custom_mode[row] != _GUIDED:
-            return ChangeMode(_GUIDED, 0)
-        if not swarm.armed[row]:
-            return Arm()
-        return TakeOffAboveHome(self.height_m) if swarm.landed_state[row] in (ON_GROUND, UNKNOWN) else None
+        guided = swarm.custom_mode[row] == _GUIDED
+        if may_arm(swarm, row):
+            return Arm() if guided else ChangeMode(_GUIDED, 0)
+        if swarm.armed[row] and guided and swarm.landed_state[row] in (ON_GROUND, UNKNOWN):
+            return TakeOffAboveHome(self.height_m)
+        return None
 
-    def hovering(self, swarm: Swarm, row: int) -> bool:
-        """At height, and take-off is over."""
-        return bool(self.obeying(swarm)[row] and at_height(swarm, row, self.height_m))
+    def climbing(self, swarm: Swarm) -> Flags:
+        """(N,) off the ground in GUIDED."""
+        off = ~np.isin(swarm.landed_state, (ON_GROUND, UNKNOWN))
+        return np.asarray(swarm.armed & off & (swarm.custom_mode == _GUIDED))
+
+    def hovering(self, swarm: Swarm) -> Flags:
+        """(N,) at height, and take-off is over."""
+        return np.asarray(self.obeying(swarm) & at_height(swarm, self.height_m))
 
     def next_to_obey(self, swarm: Swarm, row: int) -> Command | None:
         """Towards GUIDED, where it is since before it took off."""

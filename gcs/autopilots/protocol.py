@@ -15,13 +15,19 @@ AT_HEIGHT = 0.3
 """m: off the height asked for."""
 ON_GROUND, TAKING_OFF = dialect.MAV_LANDED_STATE_ON_GROUND, dialect.MAV_LANDED_STATE_TAKEOFF
 UNKNOWN = dialect.MAV_LANDED_STATE_UNDEFINED
+SLOW_S: tuple[tuple[int, float], ...] = (
+    (messages.ATTITUDE, 1.0),
+    (messages.SYS_STATUS, 1.0),
+    (messages.EXTENDED_SYS_STATE, 1.0),
+)
+"""Message id and interval of what is shown and recorded now and then."""
 
 
 class Autopilot(Protocol):
     """One kind of autopilot. Rows are those of the swarm; a vehicle of another kind is not asked about."""
 
     def streams(self) -> tuple[Command, ...]:
-        """What a vehicle shall send regularly, and how often."""
+        """What a vehicle shall send regularly, and how often, beside its position and velocity."""
         ...
 
     def asked_once(self, swarm: Swarm, row: int) -> tuple[Command, ...]:
@@ -29,11 +35,15 @@ class Autopilot(Protocol):
         ...
 
     def next_to_fly(self, swarm: Swarm, row: int) -> Command | None:
-        """Towards hovering at height."""
+        """Towards hovering at height. Rotors that turn in a mode into which we did not bring it are somebody else's."""
         ...
 
-    def hovering(self, swarm: Swarm, row: int) -> bool:
-        """At height, and take-off is over."""
+    def climbing(self, swarm: Swarm) -> Flags:
+        """(N,) taking off, or there, and nobody has stopped it."""
+        ...
+
+    def hovering(self, swarm: Swarm) -> Flags:
+        """(N,) at height, and take-off is over."""
         ...
 
     def next_to_obey(self, swarm: Swarm, row: int) -> Command | None:
@@ -89,6 +99,6 @@ def missing(swarm: Swarm, row: int) -> tuple[Command, ...]:
     return tuple(asked)
 
 
-def at_height(swarm: Swarm, row: int, height_m: float) -> bool:
-    """Whether a vehicle is as high above its home as it was asked to be."""
-    return bool(abs(-swarm.position_ned[row, 2] - height_m) < AT_HEIGHT)
+def at_height(swarm: Swarm, height_m: float) -> Flags:
+    """(N,) who is as high above its home as it was asked to be."""
+    return np.asarray(np.abs(-swarm.position_ned[:, 2] - height_m) < AT_HEIGHT)

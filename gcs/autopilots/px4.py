@@ -10,25 +10,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcs import messages
-from gcs.autopilots.protocol import at_height, in_modes, may_arm, missing
+from gcs.autopilots.protocol import SLOW_S, at_height, in_modes, may_arm, missing
 from gcs.commands import Arm, ChangeMode, Command, Land, RequestStream, TakeOff
 from gcs.telemetry import Flags, Swarm
 from wire.modes import PX4_MODES
 
-SLOW_S: tuple[tuple[int, float], ...] = (
-    (messages.ATTITUDE, 1.0),
-    (messages.SYS_STATUS, 1.0),
-    (messages.EXTENDED_SYS_STATE, 1.0),
-)
-"""Message id and interval of what is shown and recorded now and then."""
 UNREAD = (
     messages.BATTERY_STATUS,
     messages.GLOBAL_POSITION_INT,
     messages.ATTITUDE_QUATERNION,
     messages.ATTITUDE_TARGET,
     messages.VFR_HUD,
+    messages.HOME_POSITION,
+    messages.GPS_GLOBAL_ORIGIN,
+    messages.GPS_RAW_INT,
 )
-"""Message ids of what PX4 streams unasked and nobody reads."""
+"""Message ids of what PX4 streams unasked and nobody reads, or not as a stream: the last three are asked for once."""
 OFF_S = -1e-6
 """An interval of −1 µs turns a stream off."""
 
@@ -41,13 +38,10 @@ class Px4:
 
     height_m: float
     """Above each vehicle's home."""
-    position_s: float
-    """How often each vehicle tells its position and velocity."""
 
     def streams(self) -> tuple[Command, ...]:
         """PX4 streams much by itself: some of it is turned off."""
-        wanted = ((messages.LOCAL_POSITION_NED, self.position_s), *SLOW_S, *((message, OFF_S) for message in UNREAD))
-        return tuple(RequestStream(*stream) for stream in wanted)
+        return tuple(RequestStream(*stream) for stream in (*SLOW_S, *((message, OFF_S) for message in UNREAD)))
 
     def asked_once(self, swarm: Swarm, row: int) -> tuple[Command, ...]:
         """Nothing but what is asked of all."""
@@ -59,19 +53,22 @@ class Px4:
 
     def next_to_fly(self, swarm: Swarm, row: int) -> Command | None:
         """Towards hovering at height. What it did before may be a mode in which PX4 does not arm, or flies off."""
-        if not swarm.armed[row] and not may_arm(swarm, row):
-            return None
-        if not swarm.armed[row]:
-            return Arm() if swarm.custom_mode[row] == _HOLD.custom_mode else ChangeMode(_HOLD.main, _HOLD.sub)
-        taking_off = swarm.custom_mode[row] == _TAKEOFF.custom_mode
-        if not taking_off and not at_height(swarm, row, self.height_m):
+        holds = swarm.custom_mode[row] == _HOLD.custom_mode
+        if may_arm(swarm, row):
+            return Arm() if holds else ChangeMode(_HOLD.main, _HOLD.sub)
+        if swarm.armed[row] and holds and not self.hovering(swarm)[row]:
             return TakeOff(float(swarm.home_m[row]) + self.height_m)
         return None
 
-    def hovering(self, swarm: Swarm, row: int) -> bool:
-        """At height, and take-off is over."""
-        climbing = swarm.custom_mode[row] == _TAKEOFF.custom_mode
-        return bool(swarm.armed[row] and not climbing and at_height(swarm, row, self.height_m))
+    def climbing(self, swarm: Swarm) -> Flags:
+        """(N,) in the mode of that name, or hovering."""
+        taking_off = swarm.custom_mode == _TAKEOFF.custom_mode
+        return np.asarray(swarm.armed & taking_off | self.hovering(swarm))
+
+    def hovering(self, swarm: Swarm) -> Flags:
+        """(N,) at height, and take-off is over."""
+        taking_off = swarm.custom_mode == _TAKEOFF.custom_mode
+        return np.asarray(swarm.armed & ~taking_off & at_height(swarm, self.height_m))
 
     def next_to_obey(self, swarm: Swarm, row: int) -> Command | None:
         """Towards OFFBOARD, which PX4 refuses while no set-points come."""

@@ -43,6 +43,7 @@ class Fleet:
             custom_mode=np.full(n, MODE["hold"]),
             landed_state=np.ones(n, int),
             boot_ms=np.full(n, 40_000),
+            interval_s=np.full(n, PERIOD_S),
             battery=np.full(n, 0.9),
             home_m=np.full(n, 320.0),
             accuracy_m=np.full(n, 0.3),

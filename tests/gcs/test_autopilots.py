@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gcs.autopilots import Fleet
+from gcs.autopilots.fleet import HEARD_NS, PLACED_NS
 from gcs.commands import (
     Arm,
     ChangeMode,
@@ -43,6 +44,8 @@ def vehicle(autopilot, mode="hold", *, height=0.0, armed=False, landed=None, **c
     known = {
         "position_ned": np.array([[0.0, 0.0, -height]]),
         "velocity_ned": np.zeros((1, 3)),
+        "position_ns": np.array([NOW]),
+        "interval_s": np.array([0.1]),
         "origin": np.array([[41.0, -81.0, 300.0]]),
         "home_m": np.array([320.0]),
         "heartbeat_ns": np.array([NOW]),
@@ -58,18 +61,25 @@ def vehicle(autopilot, mode="hold", *, height=0.0, armed=False, landed=None, **c
     return replace(Swarm.of((1,)), **(known | changes))
 
 
+def known(swarm):
+    return not FLEET.lacking(swarm, 0, NOW)
+
+
 # --- what must be known
 
 
 @both
 def test_a_vehicle_of_which_everything_is_known_is_asked_for_nothing(autopilot):
     swarm = vehicle(autopilot)
-    assert FLEET.known(swarm, 0)
-    assert FLEET.next_to_know(swarm, 0) == ()
+    assert known(swarm)
+    assert FLEET.next_to_know(swarm, 0, NOW) == ()
 
 
 LACKING = {
     "position_ned": (np.full((1, 3), np.nan), RequestStream(32, 0.1), "position and velocity"),
+    "position_ns": (np.array([NOW - PLACED_NS - 1]), RequestStream(32, 0.1), "position and velocity"),
+    "interval_s": (np.array([1.0]), RequestStream(32, 0.1), "positions every 0.1 s"),
+    "heartbeat_ns": (np.array([NOW - HEARD_NS - 1]), RequestStream(1, 1.0), "a heartbeat"),
     "origin": (np.full((1, 3), np.nan), RequestMessage(49), "its origin"),
     "home_m": (np.full(1, np.nan), RequestMessage(242), "its home"),
     "accuracy_m": (np.full(1, np.nan), RequestMessage(24), "its horizontal accuracy"),
@@ -83,16 +93,40 @@ LACKING = {
 def test_what_is_not_known_is_asked_for(autopilot, lacking):
     unknown, request, words = LACKING[lacking]
     swarm = vehicle(autopilot, **{lacking: unknown})
-    assert not FLEET.known(swarm, 0)
-    assert FLEET.lacking(swarm, 0) == (words,)
-    assert request in FLEET.next_to_know(swarm, 0)
+    assert not known(swarm)
+    assert FLEET.lacking(swarm, 0, NOW) == (words,)
+    assert request in FLEET.next_to_know(swarm, 0, NOW)
+
+
+@both
+@pytest.mark.parametrize(
+    ("interval_s", "enough"), [(0.02, True), (0.1, True), (0.3, True), (0.31, False), (np.nan, False)]
+)
+def test_a_stream_may_come_a_third_as_often_as_asked_for(autopilot, interval_s, enough):
+    swarm = vehicle(autopilot, interval_s=np.array([interval_s]))
+    assert known(swarm) is enough
+    assert FLEET.next_to_hear(swarm, 0, NOW) == (None if enough else RequestStream(32, 0.1))
+
+
+@pytest.mark.parametrize(("interval_s", "enough"), [(0.2, True), (0.21, False)])
+def test_but_five_positions_a_second_are_enough_however_many_were_asked_for(interval_s, enough):
+    swarm = vehicle(PX4, interval_s=np.array([interval_s]))
+    assert (Fleet(height_m=HEIGHT, position_s=0.02).lacking(swarm, 0, NOW) == ()) is enough
+
+
+@both
+def test_a_vehicle_in_the_air_that_is_not_heard_is_asked_for_its_positions_again(autopilot):
+    flying = {"armed": True, "height": HEIGHT, "interval_s": np.array([0.1])}
+    for age_ns, again in ((PLACED_NS, None), (PLACED_NS + 1, RequestStream(32, 0.1))):
+        swarm = vehicle(autopilot, position_ns=np.array([NOW - age_ns]), **flying)
+        assert FLEET.next_to_hear(swarm, 0, NOW) == again
 
 
 @both
 def test_an_origin_that_may_never_be_told_is_looked_for_by_the_global_position_too(autopilot):
-    asked = FLEET.next_to_know(vehicle(autopilot, origin=np.full((1, 3), np.nan)), 0)
+    asked = FLEET.next_to_know(vehicle(autopilot, origin=np.full((1, 3), np.nan)), 0, NOW)
     assert {RequestMessage(49), RequestMessage(33)} < set(asked)
-    assert RequestMessage(33) not in FLEET.next_to_know(vehicle(autopilot, ready=np.zeros(1, bool)), 0)
+    assert RequestMessage(33) not in FLEET.next_to_know(vehicle(autopilot, ready=np.zeros(1, bool)), 0, NOW)
 
 
 @both
@@ -101,9 +135,9 @@ def test_every_parameter_is_asked_for_until_it_is_told(autopilot):
     for name in told:
         rest = {other: value for other, value in told.items() if other != name}
         swarm = vehicle(autopilot, parameters=(rest,))
-        asked = [command for command in FLEET.next_to_know(swarm, 0) if isinstance(command, RequestParameter)]
-        assert not FLEET.known(swarm, 0)
-        assert name in FLEET.lacking(swarm, 0)[0]
+        asked = [command for command in FLEET.next_to_know(swarm, 0, NOW) if isinstance(command, RequestParameter)]
+        assert not known(swarm)
+        assert name in FLEET.lacking(swarm, 0, NOW)[0]
         assert RequestParameter(name) in asked
         assert not {command.name for command in asked} & set(rest)
 
@@ -111,31 +145,33 @@ def test_every_parameter_is_asked_for_until_it_is_told(autopilot):
 @pytest.mark.parametrize(("old", "new"), [("SYSID_MYGCS", "MAV_GCS_SYSID"), ("WPNAV_SPEED", "WP_SPD")])
 def test_a_parameter_that_newer_firmware_has_renamed_is_known_by_either_name(old, new):
     told = {new if name == old else name: value for name, value in TOLD[ARDUPILOT].items()}
-    assert FLEET.known(vehicle(ARDUPILOT, parameters=(told,)), 0)
+    assert known(vehicle(ARDUPILOT, parameters=(told,)))
     neither = {name: value for name, value in told.items() if name != new}
-    asked = FLEET.next_to_know(vehicle(ARDUPILOT, parameters=(neither,)), 0)
+    asked = FLEET.next_to_know(vehicle(ARDUPILOT, parameters=(neither,)), 0, NOW)
     assert {RequestParameter(old), RequestParameter(new)} < set(asked)
 
 
 @pytest.mark.parametrize("flags", [0, 0x33E, 0x23F, 0x400])
 def test_an_arducopter_is_ready_only_with_its_whole_estimator(flags):
     swarm = vehicle(ARDUPILOT, estimator=np.array([flags]))
-    assert not FLEET.known(swarm, 0)
-    assert RequestMessage(193) in FLEET.next_to_know(swarm, 0)
+    assert not known(swarm)
+    assert RequestMessage(193) in FLEET.next_to_know(swarm, 0, NOW)
 
 
 def test_px4_is_ready_when_it_says_so():
-    assert FLEET.known(vehicle(PX4, estimator=np.array([0])), 0)
+    assert known(vehicle(PX4, estimator=np.array([0])))
 
 
 @both
 @pytest.mark.parametrize("of", ["nobody heard", "another autopilot"])
 def test_of_strangers_nothing_is_asked(autopilot, of):
-    strange = {"heartbeat_ns": Swarm.of((1,)).heartbeat_ns} if of == "nobody heard" else {"autopilot": np.array([8])}
+    unheard = Swarm.of((1,))
+    strange = {"heartbeat_ns": unheard.heartbeat_ns, "autopilot": unheard.autopilot}
+    strange = strange if of == "nobody heard" else {"autopilot": np.array([8])}
     swarm = replace(vehicle(autopilot, armed=True, height=HEIGHT), **strange)
-    assert FLEET.next_to_know(swarm, 0) == ()
-    assert not FLEET.known(swarm, 0)
-    assert not FLEET.hovering(swarm, 0)
+    assert FLEET.next_to_know(swarm, 0, NOW) == ()
+    assert not known(swarm)
+    assert not FLEET.hovering(swarm).any()
     steps = (FLEET.next_to_fly, FLEET.next_to_obey, FLEET.next_to_land, FLEET.next_to_hold)
     assert [step(swarm, 0) for step in steps] == [None] * 4
 
@@ -181,6 +217,32 @@ def test_nobody_is_armed_but_on_the_ground(autopilot, landed):
         assert FLEET.next_to_fly(swarm, 0) is None
 
 
+@both
+def test_rotors_that_turn_in_a_mode_that_is_not_ours_to_take_off_from_are_left_alone(autopilot):
+    """A pilot who armed first has the vehicle."""
+    for mode in set(MODES[autopilot]) - {"hold", "guided"}:
+        for height in (0.0, 3.0):
+            swarm = vehicle(autopilot, mode, armed=True, height=height, landed=ON_GROUND)
+            assert FLEET.next_to_fly(swarm, 0) is None
+
+
+@pytest.mark.parametrize(
+    ("swarm", "climbing"),
+    [
+        (vehicle(PX4, "takeoff", armed=True, height=3.0), True),
+        (vehicle(PX4, armed=True, height=HEIGHT), True),
+        (vehicle(PX4, armed=True, height=3.0), False),
+        (vehicle(PX4, "takeoff"), False),
+        (guided(armed=True, height=3.0, landed=TAKING_OFF), True),
+        (guided(armed=True, height=3.0), True),
+        (guided(armed=True), False),
+        (vehicle(ARDUPILOT, "brake", armed=True, height=3.0), False),
+    ],
+)
+def test_climbing_is_off_the_ground_and_not_stopped(swarm, climbing):
+    assert FLEET.climbing(swarm).tolist() == [climbing]
+
+
 @pytest.mark.parametrize(
     ("swarm", "hovering"),
     [
@@ -196,7 +258,7 @@ def test_nobody_is_armed_but_on_the_ground(autopilot, landed):
     ],
 )
 def test_hovering_is_at_height_with_the_take_off_over(swarm, hovering):
-    assert FLEET.hovering(swarm, 0) is hovering
+    assert FLEET.hovering(swarm).tolist() == [hovering]
 
 
 # --- under our control, and down

@@ -165,9 +165,9 @@ def joined(world, seconds=6.0):
         world.sleep_until(start + (second + 1) * 10**9)
         swarm = observe(swarm, world.receive())
         for row, system in enumerate(ids):
-            for command in fleet.next_to_know(swarm, row):
+            for command in fleet.next_to_know(swarm, row, world.now()):
                 world.send(system, encoders[system].encode(command, 0))
-    assert all(fleet.known(swarm, row) for row in range(6))
+    assert not any(fleet.lacking(swarm, row, world.now()) for row in range(6))
     assert not swarm.armed.any()
     return swarm
 

@@ -146,11 +146,51 @@ def test_a_position_that_was_overtaken_on_the_way_is_dropped(late_ms):
     assert same(swarm, observe(FLEET, [position(boot_ms=5000)]))
 
 
-@pytest.mark.parametrize("late_ms", [REBOOTED_MS, 4999])
-def test_a_vehicle_that_booted_again_is_believed(late_ms):
-    swarm = observe(FLEET, [position(boot_ms=5000), position(boot_ms=5000 - late_ms, place=(9.0, 9.0, 9.0))])
-    assert swarm.position_ned[1].tolist() == [9, 9, 9]
-    assert swarm.boot_ms[1] == 5000 - late_ms
+def told_at(*boot_ms):
+    """The vehicle after reports of these times of its own clock, each from a place as far north as its time [m]."""
+    return observe(FLEET, [position(boot_ms=at, place=(float(at), 0.0, 0.0)) for at in boot_ms])
+
+
+@pytest.mark.parametrize("late_ms", [REBOOTED_MS, 4900])
+def test_a_vehicle_that_booted_again_is_believed_when_its_new_clock_goes_on(late_ms):
+    late = 5000 - late_ms
+    assert told_at(5000, late).boot_ms[1] == 5000
+    assert told_at(5000, late, late + 50).position_ned[1, 0] == late + 50
+    assert told_at(5000, late, late + 50).boot_ms[1] == late + 50
+    assert told_at(9000, late + 2000, late, late + 50).boot_ms[1] == late + 50
+
+
+@pytest.mark.parametrize(
+    "boot_ms",
+    [
+        (5000, 2000),
+        (5000, 2000, 2000),
+        (5000, 2050, 2000),
+        (5000, 2000, 5000 - 50, 2050),
+        (9000, 1000, 1000 + REBOOTED_MS),
+    ],
+    ids=["late", "played again", "in the wrong order", "beside the others", "far apart"],
+)
+def test_reports_that_are_merely_late_or_played_again_are_no_reboot(boot_ms):
+    swarm = told_at(*boot_ms)
+    assert (swarm.boot_ms[1], swarm.position_ned[1, 0]) == (boot_ms[0],) * 2
+
+
+def test_a_report_of_the_old_clock_ends_the_doubt():
+    assert told_at(5000, 2000, 5050, 2050).boot_ms[1] == 5050
+
+
+def test_the_interval_is_that_of_the_last_second_by_the_vehicles_own_clock():
+    assert np.isnan(told_at(1000).interval_s[1])
+    assert told_at(1000, 2000).interval_s[1] == 1.0
+    often = told_at(1000, *range(2000, 5000, 50))
+    assert often.interval_s[1] == pytest.approx(0.05 + 0.95 * 0.95**59)
+    assert told_at(1000, 2000, *range(2050, 4000, 50), 6000).interval_s[1] > 1.9
+
+
+@pytest.mark.parametrize("boot_ms", [(1000, 1100), (1000, 1100, 1100), (1000, 1100, 1050)])
+def test_reports_that_are_dropped_make_no_stream_denser(boot_ms):
+    assert told_at(*boot_ms).interval_s[1] == pytest.approx(0.1)
 
 
 def test_the_first_position_counts_whatever_its_clock_says():
