@@ -25,6 +25,7 @@ USUAL_BITS_PER_S = 57_600
 """Of a telemetry radio as it is sold, and of an autopilot's telemetry port as it is delivered."""
 SLOWEST, FASTEST = 1_200, 12_000_000
 """Bits a second that a serial line may be asked for."""
+DIGITS_AT_MOST = 9
 
 _ALIASES = {"udp": "udpin", "tcpout": "tcp"}
 _KINDS: tuple[Kind, ...] = ("udpin", "udpout", "tcp", "tcpin", "serial")
@@ -74,14 +75,18 @@ def parse(text: str) -> list[Connection]:
 
 
 def _network(text: str, kind: Kind, place: str) -> list[Connection]:
-    match = re.fullmatch(r"([^:/]*):(\d+)(?:-(\d+))?", place)
+    match = re.fullmatch(r"([^:/\s\0]*):(\d+)(?:-(\d+))?", place)
     if match is None:
         raise _unreadable(text)
-    host, first, last = match[1], int(match[2]), int(match[3] or match[2])
+    host, first, last = match[1], _number(text, match[2]), _number(text, match[3] or match[2])
     if not 1 <= first <= last <= 65535:
         raise ConnectionRefused(f"{text!r}: ports must be 1 to 65535, the first of a range not above the last")
     if kind in _CALLERS and not host:
         raise ConnectionRefused(f"{text!r}: {kind} needs a host to speak to, as in {kind}:127.0.0.1:{first}")
+    try:
+        host.encode("idna")
+    except UnicodeError:
+        raise ConnectionRefused(f"{text!r}: {host} cannot be the name of a host") from None
     one = Connection(kind, host or "0.0.0.0", first)
     return [replace(one, port=port) for port in range(first, last + 1)]
 
@@ -90,12 +95,18 @@ def _serial(text: str, place: str) -> Connection:
     match = re.fullmatch(r"(/\S*?[^/:\s])(?::(\d+))?", place)
     if match is None:
         raise ConnectionRefused(f"{text!r}: a serial line must read like serial:/dev/ttyUSB0:{USUAL_BITS_PER_S}")
-    bits_per_s = int(match[2] or USUAL_BITS_PER_S)
+    bits_per_s = USUAL_BITS_PER_S if match[2] is None else _number(text, match[2])
     if not SLOWEST <= bits_per_s <= FASTEST:
         raise ConnectionRefused(
             f"{text!r}: {bits_per_s} bits/s is no speed of a serial line; allowed are {SLOWEST} to {FASTEST}"
         )
     return Connection("serial", device=match[1], bits_per_s=bits_per_s)
+
+
+def _number(text: str, digits: str) -> int:
+    if len(digits) > DIGITS_AT_MOST:
+        raise ConnectionRefused(f"{text!r}: no number here has more than {DIGITS_AT_MOST} digits")
+    return int(digits)
 
 
 def _unreadable(text: str) -> ConnectionRefused:

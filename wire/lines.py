@@ -199,9 +199,19 @@ class SerialPort(LonePort):
 
 
 def _serial(connection: Connection) -> _Source:
+    """Raises OSError."""
+    import termios
+
     from serial import Serial  # only who has a serial line waits for its import
 
-    line: _Source = Serial(connection.device, connection.bits_per_s, timeout=0, write_timeout=0, exclusive=True)
+    try:
+        line: _Source = Serial(connection.device, connection.bits_per_s, timeout=0, write_timeout=0, exclusive=True)
+    except (
+        termios.error
+    ) as error:  # of a device that goes while it is being opened: no OSError, though it says the same
+        raise OSError(*error.args) from None
+    except ValueError as error:  # of a speed that the device does not have
+        raise OSError(str(error)) from None
     return line
 
 

@@ -5,9 +5,11 @@ import select
 import socket
 import subprocess
 import sys
+import termios
 import tty
 
 import pytest
+import serial
 
 from wire.connection import Connection, ConnectionRefused, parse
 from wire.lines import CALLERS_AT_MOST, RETRY_S, CallingPort, SerialPort, TcpInPort
@@ -258,6 +260,49 @@ def test_a_full_serial_line_refuses_and_goes_on_where_it_stopped(opened, termina
         got += os.read(far, 65536)
         port.receive()
     assert got == frame * sum(taken)
+
+
+class Going:
+    """A serial.Serial whose device goes while it is being opened, or does not know its speed."""
+
+    def __init__(self, error):
+        self.error = error
+
+    def __call__(self, *_, **__):
+        raise self.error
+
+
+ODD_ERRORS = [
+    (termios.error(5, "Input/output error"), "Input/output error"),
+    (
+        ValueError("Failed to set custom baud rate (12345)"),
+        "this is not a serial line, or it does not go at that speed",
+    ),
+]
+
+
+@pytest.mark.parametrize(("error", "words"), ODD_ERRORS)
+def test_a_device_that_goes_while_it_is_being_opened_is_refused_in_one_sentence(monkeypatch, error, words):
+    monkeypatch.setattr(serial, "Serial", Going(error))
+    with pytest.raises(ConnectionRefused, match=rf"^serial:/dev/ttyUSB0:57600: {words}$"):
+        open_port(parse("serial:/dev/ttyUSB0:57600")[0])
+
+
+@pytest.mark.parametrize(("error", "_words"), ODD_ERRORS)
+def test_a_device_that_goes_while_it_is_being_opened_again_is_tried_once_more(
+    opened, terminal, monkeypatch, error, _words
+):
+    clock, (far, name) = Time(), terminal
+    port = opened(SerialPort(Connection("serial", device=name, bits_per_s=57600), monotonic=clock))
+    port._drop(port._line)
+    clock.now += RETRY_S
+    with monkeypatch.context() as unplugged:
+        unplugged.setattr(serial, "Serial", Going(error))
+        assert port.receive() == []
+        assert not port.send(b"anybody?")
+    clock.now += RETRY_S
+    assert port.send(b"hello")
+    assert os.read(far, 100) == b"hello"
 
 
 def test_a_device_that_was_pulled_out_is_opened_again_when_it_is_back(opened, tmp_path):
