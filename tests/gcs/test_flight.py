@@ -57,7 +57,7 @@ def test_everybody_is_asked_to_land_once_and_the_flight_ends_when_they_are_down(
 def test_vehicles_that_never_speak_are_named_when_joining_has_taken_too_long():
     log = Log(Fleet(silent={3: 0, 6: 0}))
     assert log.phases() == [Phase.JOIN, Phase.DONE]
-    assert "vehicles 3, 6 were not heard" in log.end.problem
+    assert "vehicles 3, 6: a heartbeat of" in log.end.problem
     assert len(log.states) * PERIOD_S == pytest.approx(JOIN_S, abs=0.3)
     assert not log.ticks_of(Arm)
 
