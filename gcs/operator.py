@@ -14,7 +14,11 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Operator:
-    """Turns the first signal into the event LAND; the second ends the process at once, its recording closed."""
+    """Turns signals into the event LAND. A second Ctrl-C ends the process at once, its recording closed.
+
+    No other signal does, however often it comes: a terminal that is closed hangs up twice. A process that was started
+    to outlive its terminal (nohup) is not landed by it.
+    """
 
     def __init__(
         self,
@@ -27,11 +31,19 @@ class Operator:
         self._say = say
         self._words = words
         self._ratings = ratings
-        self._waiting: list[str] = []
-        self.interrupted = False
+        self._asked = self._told = 0
+        """Signals that came, counted by their handler alone, and those of them that were handed out."""
+        self._pressed = False
+        """Ctrl-C."""
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether any signal came."""
+        return self._asked > 0
 
     def __enter__(self) -> Operator:
-        self._before = {number: signal.signal(number, self._on_signal) for number in SIGNALS}
+        heeded = [number for number in SIGNALS if not _outlives(number)]
+        self._before = {number: signal.signal(number, self._on_signal) for number in heeded}
         return self
 
     def __exit__(
@@ -42,14 +54,22 @@ class Operator:
 
     def events(self) -> tuple[Event, ...]:
         """What came since the last call; what is to be said of it is said here, outside the signal."""
-        asked, self._waiting = tuple(self._waiting), []
-        if asked:
+        asked = self._asked
+        landing = (LAND,) if asked > self._told else ()
+        self._told = asked
+        if landing:
+            once_more = " Ctrl-C once more ends at once and lands nothing." if self._pressed else ""
             with suppress(Exception):  # a terminal that has gone is why we land, not why we do not
-                self._say("Landing the swarm. Ctrl-C once more ends at once and lands nothing.")
-        return *asked, *self._words(), *self._ratings()
+                self._say(f"Landing the swarm.{once_more}")
+        return *landing, *self._words(), *self._ratings()
 
-    def _on_signal(self, _signal: int, _frame: FrameType | None) -> None:
-        if self.interrupted:
-            raise KeyboardInterrupt
-        self.interrupted = True
-        self._waiting.append(LAND)
+    def _on_signal(self, number: int, _frame: FrameType | None) -> None:
+        if number == signal.SIGINT:
+            if self._pressed:
+                raise KeyboardInterrupt
+            self._pressed = True
+        self._asked += 1
+
+
+def _outlives(number: signal.Signals) -> bool:
+    return number == signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN

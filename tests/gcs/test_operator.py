@@ -8,19 +8,83 @@ import pytest
 from gcs.events import HOLD, LAND, kill, killed, take_back, taken_back
 from gcs.operator import Operator
 
+LANDS = "Landing the swarm."
+ENDS = f"{LANDS} Ctrl-C once more ends at once and lands nothing."
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_the_first_signal_lands_the_swarm_once_and_the_second_ends_at_once(number):
+
+def press(number):
+    os.kill(os.getpid(), number)
+
+
+@pytest.mark.parametrize(
+    ("number", "words"), [(signal.SIGINT, ENDS), (signal.SIGTERM, LANDS), (signal.SIGHUP, LANDS)], ids=repr
+)
+def test_a_signal_lands_the_swarm_once(number, words):
     said = []
     with Operator(said.append) as operator:
         assert operator.events() == ()
-        os.kill(os.getpid(), number)
+        assert not operator.interrupted
+        press(number)
         assert operator.interrupted
         assert operator.events() == (LAND,)
         assert operator.events() == ()
-        assert said == ["Landing the swarm. Ctrl-C once more ends at once and lands nothing."]
+        assert said == [words]
+
+
+def test_a_second_ctrl_c_ends_at_once():
+    with Operator(str) as operator:
+        press(signal.SIGINT)
+        assert operator.events() == (LAND,)
         with pytest.raises(KeyboardInterrupt):
-            os.kill(os.getpid(), number)
+            press(signal.SIGINT)
+
+
+@pytest.mark.parametrize("first", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("second", [signal.SIGTERM, signal.SIGHUP])
+def test_a_terminal_that_hangs_up_and_a_polite_kill_land_again_and_end_nothing(first, second):
+    with Operator(str) as operator:
+        for number in (first, second, second):
+            press(number)
+        assert operator.events() == (LAND,)
+        press(second)
+        assert operator.events() == (LAND,)
+        assert operator.events() == ()
+
+
+def test_ctrl_c_after_other_signals_is_the_first_of_its_kind():
+    with Operator(str) as operator:
+        press(signal.SIGHUP)
+        press(signal.SIGINT)
+        assert operator.events() == (LAND,)
+        with pytest.raises(KeyboardInterrupt):
+            press(signal.SIGINT)
+
+
+def test_a_signal_that_comes_while_the_last_is_handed_out_is_not_lost():
+    pressed = []
+
+    def say(_words):
+        if not pressed:
+            pressed.append(press(signal.SIGTERM))
+
+    with Operator(say) as operator:
+        press(signal.SIGTERM)
+        assert operator.events() == (LAND,)
+        assert operator.events() == (LAND,)
+        assert operator.events() == ()
+
+
+def test_who_was_started_to_outlive_its_terminal_is_not_landed_by_a_logout():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with Operator(str) as operator:
+            press(signal.SIGHUP)
+            assert operator.events() == ()
+            press(signal.SIGTERM)
+            assert operator.events() == (LAND,)
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def test_a_terminal_that_has_gone_does_not_keep_the_word_from_the_flight():
