@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from typing import Any
+
+from gcs.unblocked import Unblocked, unblocked
 
 
 def say(words: str) -> None:
@@ -19,6 +21,14 @@ def write(line: bytes) -> None:
     sys.stdout.write(line.decode() + "\n")
 
 
+def report(text: str) -> None:
+    """A flight's result, on stdout, behind what was said. A terminal that takes nothing is not waited for."""
+    if isinstance(sys.stderr, Unblocked):
+        sys.stderr.drain()
+    with unblocked("stdout") if sys.stdout.isatty() else nullcontext():
+        sys.stdout.write(text + "\n")
+
+
 def stdout() -> Any:
     """For tables. As wide as the terminal; elsewhere wide enough for ours."""
     from rich.console import Console
@@ -27,14 +37,10 @@ def stdout() -> Any:
 
 
 def stderr() -> Any:
-    """For what goes on. Where whoever read it has hung up it falls silent; rich would end the process."""
+    """For what goes on."""
     from rich.console import Console
 
-    class Patient(Console):
-        def on_broken_pipe(self) -> None:
-            self.quiet = True
-
-    return Patient(stderr=True)
+    return Console(stderr=True)
 
 
 def asked(question: str) -> str | None:

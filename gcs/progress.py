@@ -20,6 +20,7 @@ from gcs.flight_state import Phase
 from gcs.loop import Tick
 from gcs.telemetry import Flags
 from gcs.track import Parts, parts_of
+from gcs.unblocked import Unblocked
 from wire.modes import mode_name
 
 REFRESH_S = 0.1
@@ -75,10 +76,17 @@ class Display:
                 self._console.print(f"{_clock(tick, self._flight)}  {phase.value}", highlight=False)
             elif phase is Phase.JOIN and tick.number % self._flight.scenario.time.ticks(WAITING_S) == 0:
                 self._console.print(f"{_clock(tick, self._flight)}  {_waiting(tick)}", highlight=False)
-        elif (now := time.monotonic()) - self._shown >= REFRESH_S or phase is not self._phase:
-            self._shown = now
+        elif self._due(phase):
+            self._shown = time.monotonic()
             self._live.update(self._screen(tick), refresh=True)
         self._phase = phase
+
+    def _due(self, phase: Phase) -> bool:
+        """Whether to draw; nothing new over a picture that is still on its way to the terminal."""
+        file = self._console.file
+        if isinstance(file, Unblocked) and file.behind:
+            return False
+        return time.monotonic() - self._shown >= REFRESH_S or phase is not self._phase
 
     def _screen(self, tick: Tick) -> Group:
         diagnosis = tick.diagnosis
