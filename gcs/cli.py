@@ -22,9 +22,10 @@ from gcs.choices import (
     check_speed,
     checked_ids,
 )
-from gcs.guard import BAD_INPUT, FLOWN, INTERRUPTED, NOT_COMPLETED, guarded
+from gcs.guard import BAD_INPUT, DONE, INTERRUPTED, NOT_DONE, guarded
 from gcs.options import AsJson, LinkTexts, Out, ScenarioName, SigningKey, Vehicles
 from gcs.supervision import NOBODY, Supervision
+from gcs.unblocked import unblocked
 
 
 def _version() -> str:
@@ -206,9 +207,9 @@ def reproduce(
     """Fly the paper's eight conditions over many seeds, and the recommended profile beside them."""
 
     def command() -> int:
+        from gcs.output import output_folder
         from gcs.reproduce import FlightNotCompleted, conditions
         from gcs.reproduce import reproduce as fly_all
-        from gcs.session import output_folder
 
         check_many(seeds, jobs)
         folder = output_folder(out, "reproduce")
@@ -216,14 +217,14 @@ def reproduce(
             result = fly_all(conditions(), seeds=seeds, jobs=jobs, console=console.stderr())
         except FlightNotCompleted as error:
             console.say(f"gcs: {error}")
-            return NOT_COMPLETED
+            return NOT_DONE
         result.save(folder)
         if json:
             console.write(result.json())
         else:
             result.show(console.stdout())
             console.say(f"written: {folder}/reproduce.json, {folder}/reproduce.md")
-        return FLOWN
+        return DONE
 
     return guarded(command)
 
@@ -279,7 +280,7 @@ def identify(
             console.write(as_json(found))
         else:
             sys.stdout.write(as_toml(found) + "\n")
-        return FLOWN
+        return DONE
 
     return guarded(command)
 
@@ -295,7 +296,7 @@ def compare(
         from gcs.compare import compare as side_by_side
 
         side_by_side(recordings, picture=out, console=console.stdout())
-        return FLOWN
+        return DONE
 
     return guarded(command)
 
@@ -314,27 +315,28 @@ def replay(
     def command() -> int:
         from gcs.replay import verify as decide_again
 
-        return decide_again(recording, console=console.stdout()) if verify else FLOWN
+        return decide_again(recording, console=console.stdout()) if verify else DONE
 
     return guarded(command)
 
 
 def main(words: Sequence[str] | None = None) -> None:
     """Entry point. words: of the command line, if not the process's own."""
-    try:
-        code = app(
-            sys.argv[1:] if words is None else words,
-            exit_on_error=False,
-            print_error=False,
-            result_action="return_value",
-        )
-    except CycloptsError as error:
-        console.say(f"gcs: {error}")
-        code = BAD_INPUT
-    except KeyboardInterrupt:
-        console.say("gcs: interrupted")
-        code = INTERRUPTED
-    except BrokenPipeError:  # the reader of our stdout has gone
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = 1
+    with unblocked("stderr"):
+        try:
+            code = app(
+                sys.argv[1:] if words is None else words,
+                exit_on_error=False,
+                print_error=False,
+                result_action="return_value",
+            )
+        except CycloptsError as error:
+            console.say(f"gcs: {error}")
+            code = BAD_INPUT
+        except KeyboardInterrupt:
+            console.say("gcs: interrupted")
+            code = INTERRUPTED
+        except BrokenPipeError:  # the reader of our stdout has gone
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            code = 1
     sys.exit(code)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,16 +12,17 @@ from gcs.choices import BadUsageError, confirmed
 from gcs.degrade import Degraded, degrading
 from gcs.events import Rating
 from gcs.flight import Flight
-from gcs.guard import BAD_INPUT, FLOWN, INTERRUPTED, NOT_COMPLETED
+from gcs.guard import BAD_INPUT, DONE, INTERRUPTED, NOT_DONE
 from gcs.links import FLIES, LISTENS, opened, understood
 from gcs.listen import before_arming, listen
 from gcs.loop import Clock, Link
 from gcs.operator import Operator
+from gcs.output import PICTURE, make_room, output_folder, room
 from gcs.progress import Display
 from gcs.rates import positions_per_tick
 from gcs.reach import ControlSocket
-from gcs.session import PICTURE, flown, make_room, output_folder
-from gcs.summary import Summary
+from gcs.session import flown
+from gcs.summary import Reception, Summary
 from gcs.supervision import Supervision
 from gcs.words import verdict
 from scenarios import MotorDegradation, Scenario
@@ -75,7 +75,11 @@ def live(scenario: Scenario, request: Request, hardware: Hardware) -> int:
         link: Link = vehicles
         if hardware.degrade is not None:
             link = Degraded(vehicles, vehicles, scenario, hardware.degrade)
-        return flight(scenario, request, link, vehicles, ratings, connections=connections)
+
+        def reception() -> Reception:
+            return Reception.of(vehicles.rejections, vehicles.quality)
+
+        return flight(scenario, request, link, vehicles, ratings, connections=connections, reception=reception)
 
 
 def flight(
@@ -86,11 +90,15 @@ def flight(
     ratings: tuple[Rating, ...] | None,
     *,
     connections: Sequence[Connection] = (),
+    reception: Callable[[], Reception] = Reception,
 ) -> int:
-    """Fly, record, show and report. connections: by which other commands may reach the flight. Exit code."""
+    """Fly, record, show and report. Exit code.
+
+    connections: by which other commands may reach the flight;  reception: tells how the vehicles were heard.
+    """
     with ExitStack() as stack:
         live_ratings = request.supervision.live(stack, scenario, console.say)
-        folder = output_folder(request.out, request.name)
+        folder = output_folder(request.out, request.name, needs=room(scenario))
         earlier = make_room(folder)
         if earlier is not None:
             console.say(f"an earlier recording is kept as {earlier}")
@@ -108,7 +116,7 @@ def flight(
         )
 
         def watching(flight: Flight) -> tuple[Display | ControlSocket, ...]:
-            display = Display(flight, screen, title=Path(request.name).stem)
+            display = stack.enter_context(Display(flight, screen, title=Path(request.name).stem))
             return (display,) if control is None else (display, control)
 
         summary = flown(
@@ -121,11 +129,12 @@ def flight(
             operator=operator,
             watching=watching,
             ratings=ratings,
+            reception=reception,
         )
     _report(summary, folder, json=request.json)
     if operator.interrupted:
         return INTERRUPTED
-    return FLOWN if summary.completed else NOT_COMPLETED
+    return DONE if summary.completed else NOT_DONE
 
 
 def _with_one_degraded(scenario: Scenario, system: int) -> Scenario:
@@ -142,9 +151,9 @@ def _report(summary: Summary, folder: Path, *, json: bool) -> None:
     if summary.problem is not None:
         console.say(f"gcs: {summary.problem}")
     if json:
-        console.write(summary.json())
+        console.report(summary.json().decode())
         return
     lines = [verdict(summary), f"recording  {summary.recording}"]
     if (folder / PICTURE).exists():
         lines.append(f"picture    {(folder / PICTURE).resolve()}")
-    sys.stdout.write("\n".join(lines) + "\n")
+    console.report("\n".join(lines))

@@ -7,37 +7,28 @@ from collections.abc import Callable
 from gcs.choices import BadUsageError
 from gcs.console import say
 
-FLOWN, BAD_INPUT, NOT_COMPLETED, INTERRUPTED = 0, 2, 3, 130
+DONE, BAD_INPUT, NOT_DONE, INTERRUPTED = 0, 2, 3, 130
 """Exit codes."""
 
 
 def guarded(command: Callable[[], int]) -> int:
-    """Bad input is one sentence and exit code 2."""
+    """What speaks to a person is one sentence and an exit code; anything else is a defect and keeps its traceback."""
     try:
         return command()
     except Exception as error:
-        if _hangs(error):
-            say(f"gcs: {error}")
-            return NOT_COMPLETED
-        if not isinstance(error, _refusals()):
+        code = _exit_code(error)
+        if code is None:
             raise
         say(f"gcs: {error}")
-        return BAD_INPUT
+        return code
 
 
-def _hangs(error: Exception) -> bool:
-    """Whether it is a flight that does not answer."""
-    from gcs.reach import Unanswered
-
-    return isinstance(error, Unanswered)
-
-
-def _refusals() -> tuple[type[Exception], ...]:
-    """What speaks to a person; anything else is a defect and keeps its traceback."""
+def _exit_code(error: Exception) -> int | None:
+    """None of a defect."""
     from gcs.compare import UnwritablePicture
     from gcs.rates import LinkTooSlow
     from gcs.ratings import RatingsError
-    from gcs.reach import Refused
+    from gcs.reach import Refused, Unanswered
     from gcs.recording.reader import UnreadableRecording
     from gcs.recording.writer import RecordingError
     from gcs.rules import RuleError
@@ -45,7 +36,7 @@ def _refusals() -> tuple[type[Exception], ...]:
     from wire.connection import ConnectionRefused
     from wire.signing import SigningKeyError
 
-    return (
+    refusals = (
         BadUsageError,
         ScenarioError,
         RuleError,
@@ -58,3 +49,6 @@ def _refusals() -> tuple[type[Exception], ...]:
         UnreadableRecording,
         UnwritablePicture,
     )
+    if isinstance(error, refusals):
+        return BAD_INPUT
+    return NOT_DONE if isinstance(error, Unanswered) else None

@@ -26,6 +26,11 @@ class LinkQuality:
     duplicated: int = 0
     """Frames that came again."""
 
+    @property
+    def loss(self) -> float | None:
+        """Share of the frames that did not come; None where there were none."""
+        return round(self.lost / (self.received + self.lost), 4) if self.received + self.lost else None
+
 
 class Meter:
     """Counts one component's frames.

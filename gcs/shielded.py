@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable
-from contextlib import AbstractContextManager
-from types import TracebackType
 
 from gcs.loop import Record, Tick
 
@@ -25,32 +23,17 @@ class Shielded:
         self.problem: str | None = None
         """Why it was left out, if it was."""
 
-    def __enter__(self) -> Shielded:
-        if isinstance(self._record, AbstractContextManager):
-            self._attempt(self._record.__enter__)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        record = self._record
-        if isinstance(record, AbstractContextManager):
-            self._attempt(lambda: record.__exit__(kind, error, trace))
-
     def tick(self, tick: Tick) -> None:
         """Hand it on."""
-        if self.problem is None:
-            self._attempt(lambda: self._record.tick(tick))
-
-    def _attempt(self, action: Callable[[], object]) -> None:
+        if self.problem is not None:
+            return
         try:
-            action()
+            self._record.tick(tick)
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # rich leaves by SystemExit where its terminal is gone
-            if self.problem is None:
-                self.problem = f"{self._name} failed and was left out: {in_words(error)}"
-                self._say(f"gcs: {self.problem}")
+            self.problem = f"{self._name} failed and was left out: {in_words(error)}"
+            self._say(f"gcs: {self.problem}")
 
 
 def in_words(error: BaseException) -> str:

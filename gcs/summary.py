@@ -2,14 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import orjson
 
+from gcs.link_quality import LinkQuality
 from gcs.scoring import CONTACT
 from scenarios import MotorDegradation, Scenario
 from scenarios.models import RULES as ASKS_FOR_TRUST
+
+
+@dataclass(frozen=True, slots=True)
+class Reception:
+    """How the vehicles were heard; empty where the link does not tell."""
+
+    rejections: dict[str, int] = field(default_factory=dict)
+    loss: dict[str, float] = field(default_factory=dict)
+
+    @staticmethod
+    def of(rejections: Mapping[str, int], quality: Mapping[int, LinkQuality]) -> Reception:
+        """As a live link tells."""
+        heard = ((system, quality[system].loss) for system in sorted(quality))
+        return Reception(
+            {reason: count for reason, count in sorted(rejections.items()) if count},
+            {str(system): loss for system, loss in heard if loss is not None},
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +65,10 @@ class Summary:
     """As heading_error_deg, of all robots."""
     rejected_frames: int
     """What came over the link and was no good frame."""
+    rejections: dict[str, int]
+    """Why it was none → how many; empty where the link does not tell."""
+    loss: dict[str, float]
+    """System id → share of its autopilot's frames that did not come, 0 … 1; of those that the link could tell."""
     problem: str | None
     """Why the flight could not be completed."""
 

@@ -18,15 +18,14 @@ from gcs.experiment.results import FILES, Asked, Results
 from gcs.experiment.run import Task, tasks
 from gcs.experiment.terminal import show
 from gcs.experiment.workers import Cluster, Local, Workers, WorkersLost
+from gcs.guard import DONE, INTERRUPTED, NOT_DONE
+from gcs.output import output_folder
 from gcs.recording.writer import RecordingError
-from gcs.session import output_folder
 from scenarios import ScenarioError
 from scenarios.experiment import load_experiment
 
 ALL_CORES = -1
 """Jobs, unless somebody says otherwise."""
-FLOWN, NOT_COMPLETED, INTERRUPTED = 0, 3, 130
-"""Exit codes."""
 MOST_NAMED = 5
 """Runs with a problem that are named on the terminal; the table names all."""
 
@@ -66,7 +65,7 @@ def experiment(
             return INTERRUPTED
         except WorkersLost as error:
             say(f"gcs: {error}; finished runs are in {folder / JOURNAL}, and the same command goes on from there")
-            return NOT_COMPLETED
+            return NOT_DONE
     results = Results.of(conducted, title=loaded.title, reference=loaded.reference, asked=asked)
     try:
         results.save(folder)
@@ -81,7 +80,7 @@ def experiment(
     if conducted.others:
         say(f"{folder / JOURNAL} holds {conducted.others} runs more, which were not asked for: they are in no table")
     say(f"written: {', '.join(str(folder / file) for file in (*FILES, *pictures))}")
-    return NOT_COMPLETED if any(run.crashed for run in results.runs) else FLOWN
+    return NOT_DONE if any(run.crashed for run in results.runs) else DONE
 
 
 def _command_line(name: str, seeds: int | None, only: Sequence[str]) -> str:

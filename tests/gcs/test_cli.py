@@ -14,14 +14,18 @@ import orjson
 import pytest
 from flights import GCS, SHORT, recorded, start
 
+from gcs import flying
+from gcs.output import output_folder, room
 from gcs.replay import decide_again
-from gcs.session import output_folder
 
 CONTRACT = {
     "scenario", "controller", "trust", "severity", "seed", "heading_error_deg", "distance_to_target_m",
     "min_separation_m", "passed", "detected", "false_alarms", "simulated_s", "real_time_factor", "recording",
 }  # fmt: skip
-BESIDES = {"profile", "scored_on", "problem", "faults", "swarm_heading_error_deg", "rejected_frames", "left_behind"}
+BESIDES = {
+    "profile", "scored_on", "problem", "faults", "swarm_heading_error_deg", "rejected_frames", "rejections", "loss",
+    "left_behind",
+}  # fmt: skip
 """Keys that the contract does not have yet."""
 BRIEFLY = [word for override in SHORT for word in ("--set", override)]
 
@@ -381,6 +385,36 @@ def test_a_disk_that_fills_up_stops_the_recording_and_not_the_flight(gcs, tmp_pa
     assert result["heading_error_deg"] is not None
     assert result["passed"] is False
     assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("file", ["summary.json", "trajectory.png"])
+def test_results_that_cannot_be_written_are_a_problem_and_are_told_all_the_same(gcs, tmp_path, monkeypatch, file):
+    monkeypatch.setattr(flying, "make_room", lambda _folder: (tmp_path / file).symlink_to("/dev/full"))
+    code, out, err = gcs("run", "demo", *BRIEFLY, "--out", tmp_path, "--json")
+    assert code == 3
+    result = orjson.loads(out)
+    assert result["problem"] == f"{tmp_path}: the results cannot be written: No space left on device"
+    assert result["heading_error_deg"] is not None
+    assert result["passed"] is False
+    assert err.endswith(f"gcs: {result['problem']}\n")
+    if file == "trajectory.png":
+        assert result == orjson.loads((tmp_path / "summary.json").read_bytes())
+        assert not (tmp_path / "trajectory.png").exists()
+
+
+def test_a_folder_without_room_for_a_whole_flight_is_refused(gcs, tmp_path):
+    code, out, err = gcs("run", "demo", "--set", "time.timeout_s=1e15", "--out", tmp_path)
+    assert (code, out) == (2, "")
+    assert one_sentence(err)
+    assert "MB are free, and a flight as long as time.timeout_s allows may leave" in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_flight_leaves_less_than_the_room_it_asks_for():
+    for flight in (recorded("emergency"), recorded("demo")):
+        share = flight.summary.simulated_s / flight.scenario.time.timeout_s
+        left = sum(path.stat().st_size for path in flight.folder.iterdir())
+        assert 0.2 * room(flight.scenario) * share < left < room(flight.scenario)
 
 
 def test_an_earlier_recording_in_the_same_folder_is_kept(gcs, tmp_path):

@@ -1,5 +1,6 @@
 """A flight whose own code fails: other code tells its vehicles to land; who only watches takes nothing with it."""
 
+from collections import Counter
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from flights import SHORT, Saying, failing, scratch
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from gcs import session
 from gcs.emergency import PAUSE_S, ROUNDS, LastResort
 from gcs.flight import Flight
 from gcs.lockstep import Lockstep
@@ -55,12 +57,55 @@ def test_an_error_in_the_air_lands_everybody_before_it_goes_on():
     said = []
     world, error = in_lockstep(failing(MISSION_TICK, defect()), said=said)
     assert isinstance(error, ZeroDivisionError)
-    assert said[-1].startswith("gcs: the flight failed (ZeroDivisionError: a defect (flights.py, line ")
-    assert said[-1].endswith("; telling its vehicles to land")
+    (words,) = said
+    assert words.startswith("gcs: the flight failed (ZeroDivisionError: a defect (flights.py, line ")
+    assert words.endswith("; telling its vehicles to land")
     swarm = seen(world)
     assert modes(swarm) == {"land"}
     assert swarm.armed.all()
     assert not seen(world, after_s=30).armed.any()
+
+
+class Lands:
+    """A link that counts how often each vehicle is told to land."""
+
+    def __init__(self, link):
+        self._link = link
+        self.told = Counter()
+
+    def receive(self):
+        return self._link.receive()
+
+    def send(self, system, frame):
+        if dialect.MAVLink(None).decode(bytearray(frame)).to_dict().get("command") == dialect.MAV_CMD_NAV_LAND:
+            self.told[system] += 1
+        self._link.send(system, frame)
+
+    @property
+    def rejected(self):
+        return self._link.rejected
+
+
+def test_each_is_told_ten_times_and_no_more():
+    links = []
+
+    def counted(world):
+        links.append(Lands(world))
+        return links[0]
+
+    in_lockstep(failing(MISSION_TICK, defect()), link=counted)
+    assert links[0].told == dict.fromkeys(range(1, 7), ROUNDS)
+
+
+def test_an_error_when_all_have_landed_commands_nothing(monkeypatch):
+    def unsound(*_figures):
+        raise defect()
+
+    monkeypatch.setattr(session, "_summary", unsound)
+    said = []
+    _, error = in_lockstep(said=said)
+    assert isinstance(error, ZeroDivisionError)
+    assert said == []
 
 
 def test_without_the_last_resort_they_would_have_held_first():

@@ -1,0 +1,75 @@
+"""Where a run writes: a folder that can be written, with room for all of it, and nobody else's results in it."""
+
+from __future__ import annotations
+
+import datetime as dt
+import shutil
+from collections.abc import Iterator
+from itertools import count as counted
+from pathlib import Path
+
+from gcs.recording.reader import RECORDING
+from gcs.recording.writer import RecordingError
+from scenarios import Scenario
+
+PICTURE = "trajectory.png"
+A_VEHICLE_MINUTE, A_PAIR_MINUTE = 1_000_000, 20_000
+"""Bytes of a recording, at most: frames of each vehicle, and what each thinks of each."""
+
+
+def make_room(folder: Path) -> Path | None:
+    """Take what an earlier run left out of the way: its recording is kept under the time it was closed at."""
+    for name in ("summary.json", PICTURE):
+        (folder / name).unlink(missing_ok=True)
+    recording = folder / RECORDING
+    if not recording.is_file() or recording.stat().st_size == 0:
+        return None
+    closed = dt.datetime.fromtimestamp(recording.stat().st_mtime, dt.UTC).strftime("%Y%m%dT%H%M%S")
+    namesakes = _namesakes(folder, f"run-{closed}", ".mcap")
+    return recording.rename(next(path for path in namesakes if not path.exists()))
+
+
+def room(scenario: Scenario) -> int:
+    """Bytes that a flight may leave behind, if it takes as long as it may."""
+    count = scenario.swarm.count
+    minutes = scenario.time.timeout_s / 60
+    return round(minutes * (count * A_VEHICLE_MINUTE + count**2 * A_PAIR_MINUTE))
+
+
+def output_folder(out: Path | None, name: str, *, needs: int = 0) -> Path:
+    """Where a run writes, made and tried. needs: bytes that must be free there. Raises RecordingError."""
+    now = dt.datetime.now(dt.UTC).strftime("%Y%m%dT%H%M%S")
+    folder = Path("runs") / f"{now}-{Path(name).stem}" if out is None else out
+    try:
+        folder = _new(folder) if out is None else folder
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".writable"
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise RecordingError(f"--out {folder}: cannot be written: {error.strerror or error}") from None
+    free = shutil.disk_usage(folder).free
+    if free < needs:
+        raise RecordingError(
+            f"--out {folder}: {free / 1e6:.0f} MB are free, and a flight as long as time.timeout_s allows may leave "
+            f"{needs / 1e6:.0f} MB there"
+        )
+    return folder
+
+
+def _new(folder: Path) -> Path:
+    """This folder, or the first of its namesakes that nobody has: two runs may begin in one second."""
+    for candidate in _namesakes(folder.parent, folder.name):
+        try:
+            candidate.mkdir(parents=True)
+        except FileExistsError:
+            continue
+        return candidate
+    raise AssertionError("names never end")
+
+
+def _namesakes(folder: Path, stem: str, suffix: str = "") -> Iterator[Path]:
+    """This name in the folder, then the same numbered from 2, without end."""
+    yield folder / f"{stem}{suffix}"
+    for number in counted(2):
+        yield folder / f"{stem}-{number}{suffix}"
