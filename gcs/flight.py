@@ -91,6 +91,7 @@ class Flight:
             phase_tick=0,
             asked=(Asked(),) * n,
             sent_ned=np.zeros((n, 3)),
+            commanded=np.zeros(n, bool),
             belief=self._beliefs.start(),
             hands=Hands.of(n),
         )

@@ -62,6 +62,8 @@ class FlightState:
     """(N) what each vehicle was last asked for, so that asking again can wait."""
     sent_ned: Array
     """(N, 3) m/s: the set-points sent last, as they were sent; zero for vehicles that were sent none."""
+    commanded: Flags
+    """(N,) whom they were sent to."""
     belief: Belief
     """Of each robot's health."""
     hands: Hands

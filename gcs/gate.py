@@ -60,7 +60,7 @@ class Limits:
     speed: float
     """m/s, horizontal and vertical each."""
     acceleration: float
-    """m/s², of one set-point against the one before."""
+    """m/s², of one set-point against the one before, or against what the vehicle flies where there was none."""
     radius: float = math.inf
     """m, horizontal, from the fence's centre."""
     ceiling: float = math.inf
@@ -100,7 +100,8 @@ class Standing:
     velocity_ned: Array
     """(N, 3) m/s."""
     before_ned: Array
-    """(N, 3) m/s: the set-points sent last, as they were sent; zero where none was."""
+    """(N, 3) m/s: the set-points of the last tick, as they were sent; NaN where none was, whoever flew meanwhile: then the
+    next goes on from what the vehicle flies."""
     lateness_ns: int
     """Of the tick, after its deadline."""
 
@@ -122,7 +123,7 @@ class Passage:
 def admit(asked_ned: Array, yaw: float, standing: Standing, limits: Limits, *, dt: float) -> Passage:
     """What is sent of what was asked, (N, 3) m/s, with this heading [rad]; dt: s between two ticks."""
     commanded = standing.ours & (standing.age_ns <= LOST_NS)
-    before = standing.before_ned
+    before = _before(standing, limits)
     meant = np.asarray((np.abs(asked_ned) <= ABSURD).all(axis=1))
     if limits.fenced:
         meant &= np.isfinite(standing.place_ned).all(axis=1) & np.isfinite(standing.velocity_ned).all(axis=1)
@@ -143,6 +144,12 @@ def admit(asked_ned: Array, yaw: float, standing: Standing, limits: Limits, *, d
         if fly
     ]
     return Passage(sent, verdict, commanded, commands)
+
+
+def _before(standing: Standing, limits: Limits) -> Array:
+    """(N, 3) m/s: from where set-points go on, in single precision and no faster than allowed."""
+    flown = _single(_shorten(np.nan_to_num(standing.velocity_ned), limits.speed * (1 - 1e-6)))
+    return np.where(np.isnan(standing.before_ned), flown, standing.before_ned)
 
 
 def _towards(wanted: Array, before: Array, limits: Limits, *, dt: float) -> Array:

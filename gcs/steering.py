@@ -62,7 +62,7 @@ class Steering:
             age_ns=now_ns - swarm.position_ns,
             place_ned=np.column_stack([state.position_ne(swarm) - self._centre_ne, swarm.position_ned[:, 2]]),
             velocity_ned=swarm.velocity_ned,
-            before_ned=state.sent_ned,
+            before_ned=np.where(state.commanded[:, None], state.sent_ned, np.nan),
             lateness_ns=state.lateness_ns(now_ns, self._time.period_ns),
         )
         passed = admit(asked_ned, self._heading(diagnosis.virtual), standing, self._limits, dt=self._time.period_s)
@@ -73,7 +73,7 @@ class Steering:
             verdict=passed.verdict,
             commanded=passed.commanded,
         )
-        return replace(state, sent_ned=passed.sent_ned), [*passed.commands], told
+        return replace(state, sent_ned=passed.sent_ned, commanded=passed.commanded), [*passed.commands], told
 
     def _heading(self, virtual: VirtualLeader | None) -> float:
         """Face the direction of travel; at its end, the last leg's."""

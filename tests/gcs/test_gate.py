@@ -312,10 +312,37 @@ def test_the_last_moment_of_being_heard_counts():
         assert one((0.1, 0, 0), age_ns=np.array([age_ns]))[1] == verdict
 
 
-def test_who_is_sent_nothing_begins_at_rest_when_sent_something_again():
-    """What was sent before is no measure any more: meanwhile, somebody else flew."""
+def test_to_who_is_sent_nothing_nothing_is_on_record_as_sent():
     nobody = standing(np.tile((3.0, 0, 0), (N, 1)), ours=np.zeros(N, bool))
     assert not admitted(np.zeros((N, 3)), nobody, LIMITS).sent_ned.any()
+
+
+UNSENT = np.full((N, 3), nan)
+
+
+@given(asked, of_vehicles(st.floats(-9, 9)), limits, places)
+def test_who_was_sent_nothing_goes_on_from_what_it_flies(asked_ned, velocity_ned, limits, place_ned):
+    """Whoever flew it meanwhile: no faster than it may, and with no more of a change than it may."""
+    fleet = standing(UNSENT, velocity_ned=velocity_ned, place_ned=place_ned)
+    for row, (north, east, down) in enumerate(admitted(asked_ned, fleet, limits).sent_ned):
+        level_m_s, most = np.hypot(*velocity_ned[row, :2]), limits.acceleration * DT
+        slower = min(1.0, limits.speed / max(level_m_s, 1e-9))
+        flown = np.append(velocity_ned[row, :2] * slower, np.clip(velocity_ned[row, 2], -limits.speed, limits.speed))
+        assert np.hypot(north - flown[0], east - flown[1]) <= most + 1e-4
+        assert abs(down - flown[2]) <= most + 1e-4
+        assert np.hypot(north, east) <= limits.speed
+        assert abs(down) <= limits.speed
+
+
+def test_a_vehicle_given_back_in_flight_is_not_jerked_to_a_stop():
+    sent, verdict = one((4.0, 0, 0), (nan, nan, nan), velocity_ned=np.array([[4.0, 0.0, 0.0]]))
+    assert sent == pytest.approx([4.0, 0, 0])
+    assert verdict == PASSED
+
+
+def test_who_was_sent_nothing_and_does_not_tell_how_fast_it_is_begins_at_rest():
+    sent, _ = one((4.0, 0, 0), (nan, nan, nan), velocity_ned=np.full((1, 3), nan))
+    assert sent.tolist() == [1.0, 0, 0]
 
 
 LATE_NS = round(LATE_PERIODS * DT * 1e9)
