@@ -7,15 +7,16 @@ from dataclasses import dataclass, field
 
 from gcs.autopilots import Fleet
 from gcs.commands import Beat, Command, Kill, Land, RequestStream
+from gcs.live import BEAT_NS, EVERYBODY
 from gcs.loop import Clock, Link
 from gcs.messages import LOCAL_POSITION_NED, Encoder
-from gcs.roster import Roster
+from gcs.roster import Roster, listed
+from gcs.routes import id_of, name_of
 from gcs.telemetry import NEVER, Swarm
 from gcs.vehicles import autopilot_name, height_of
 from wire.modes import ARDUPILOT, PX4, mode_name
 
 STEP_NS = 100_000_000
-BEAT_NS = 1_000_000_000
 ASK_NS = 1_000_000_000
 """Between two askings of one vehicle: its answer is its next heartbeat."""
 TELL_NS = 5_000_000_000
@@ -24,8 +25,6 @@ HEAR_S = 3.0
 """Heartbeats come once a second: whoever is there has been heard by then."""
 SILENT_S = 6.0
 """Who was not heard by then is not there."""
-EVERYBODY = 0
-"""A system id that no vehicle has: reaches those who wait to be spoken to."""
 
 _FLEET = Fleet(height_m=0.0, position_s=0.5)
 
@@ -38,7 +37,7 @@ class Order:
     next: Callable[[Swarm], Command | None]
     """The one thing to ask of a swarm's only vehicle; None where it is under way, or there."""
     done: Callable[[Swarm], bool]
-    said: str
+    said: Callable[[Swarm], str]
     """Of a vehicle that is there."""
     patience_s: float
 
@@ -58,28 +57,28 @@ LANDING = Order(
     word="land",
     next=_next_to_land,
     done=lambda swarm: not swarm.armed[0],
-    said="on the ground, rotors off",
+    said=lambda _swarm: "on the ground, rotors off",
     patience_s=90.0,
 )
 HOLDING = Order(
     word="hold",
     next=lambda swarm: _FLEET.next_to_hold(swarm, 0),
     done=lambda swarm: not swarm.armed[0] or (_known(swarm) and _FLEET.next_to_hold(swarm, 0) is None),
-    said="holds",
+    said=lambda swarm: "holds" if swarm.armed[0] else "is not in the air, rotors off",
     patience_s=10.0,
 )
 KILLING = Order(
     word="kill",
     next=lambda swarm: Kill() if swarm.armed[0] else None,
     done=lambda swarm: not swarm.armed[0],
-    said="rotors off",
+    said=lambda _swarm: "rotors off",
     patience_s=10.0,
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of it, by system id."""
+    """What came of it, by number: a vehicle's system id, or more where several have the same (gcs.routes)."""
 
     done: tuple[int, ...]
     not_done: dict[int, str]
@@ -106,7 +105,10 @@ class _Case:
 
 @dataclass(slots=True)
 class Intervention:
-    """One order to a fleet, until telemetry shows that it is obeyed. Whoever is heard is asked at once."""
+    """One order to a fleet, until telemetry shows that it is obeyed. Whoever is heard is asked at once.
+
+    Vehicles that share a system id are vehicles of their own, where the link tells them apart.
+    """
 
     order: Order
     link: Link
@@ -138,24 +140,27 @@ class Intervention:
             self.clock.sleep_until(now_ns + STEP_NS)
 
     def _wanted(self) -> list[int]:
-        return [system for system in self.roster.swarms if not self.only or system in self.only]
+        return [number for number in self.roster.swarms if not self.only or id_of(number) in self.only]
+
+    def _missing(self) -> set[int]:
+        return set(self.only) - self.roster.swarms.keys()
 
     def _see_to(self, system: int, now_ns: int) -> None:
         swarm = self.roster.swarms[system]
         case = self._cases.get(system)
         if case is None:
-            case = self._cases[system] = _Case(Encoder(system))
-            self.say(f"vehicle {system} is heard: {described(swarm)}")
+            case = self._cases[system] = _Case(Encoder(id_of(system)))
+            self.say(f"vehicle {name_of(system)} is heard: {described(swarm)}")
             self._send(system, RequestStream(LOCAL_POSITION_NED, 0.5))
         done, wanted = self.order.done(swarm), self.order.next(swarm)
-        if done and case.told != self.order.said:
-            case.told = self.order.said
-            self.say(f"vehicle {system}: {self.order.said}")
+        if done and case.told != (told := self.order.said(swarm)):
+            case.told = told
+            self.say(f"vehicle {name_of(system)}: {told}")
         if wanted is None:
             case.obeyed |= bool(swarm.armed[0])
         elif case.obeyed and not case.taken:
             case.taken = True
-            self.say(f"vehicle {system} was taken over by another ({_mode(swarm)}): it is asked no more")
+            self.say(f"vehicle {name_of(system)} was taken over by another ({_mode(swarm)}): it is asked no more")
         if wanted is not None and not case.taken and now_ns - case.asked_ns >= ASK_NS:
             case.asked_ns = now_ns
             self._send(system, wanted)
@@ -167,27 +172,26 @@ class Intervention:
         """An autopilot obeys, and some speak, only where a ground station is alive."""
         for system in self._cases:
             self._send(system, Beat())
-        if not self._cases or len(self._cases) < len(self.only):
+        if not self._cases or self._missing():
             self.link.send(EVERYBODY, self._everybody.encode(Beat(), 0))
 
     def _tell(self) -> None:
         waiting = [
-            f"{system} ({_mode(swarm)}, {_metres(height_of(swarm))})"
+            f"{name_of(system)} ({_mode(swarm)}, {_metres(height_of(swarm))})"
             for system in self._wanted()
             if not self.order.done(swarm := self.roster.swarms[system])
         ]
         if waiting:
-            self.say(f"{self.order.word}: waiting for {', '.join(waiting)}")
+            self.say(f"{self.order.word}: waiting for {listed(waiting)}")
 
     def _over(self, passed_s: float, now_ns: int) -> bool:
         if passed_s >= self.order.patience_s:
             return True
         if passed_s < HEAR_S:
             return False
-        heard = set(self._wanted())
-        if not heard or not set(self.only) <= heard:
-            return passed_s >= SILENT_S and all(self._settled(system, now_ns) for system in heard)
-        return all(self._settled(system, now_ns) for system in heard)
+        heard = self._wanted()
+        waits = (not heard or self._missing()) and passed_s < SILENT_S
+        return not waits and all(self._settled(system, now_ns) for system in heard)
 
     def _settled(self, system: int, now_ns: int) -> bool:
         return self._cases[system].taken or self._done(system, now_ns)
@@ -197,7 +201,7 @@ class Intervention:
 
     def _outcome(self, now_ns: int) -> Outcome:
         done, not_done = list[int](), dict[int, str]()
-        for system in sorted({*self._wanted(), *self.only}):
+        for system in sorted({*self._wanted(), *self._missing()}):
             if system not in self.roster.swarms:
                 not_done[system] = "is not heard"
             elif self._done(system, now_ns):

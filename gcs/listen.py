@@ -9,11 +9,9 @@ import numpy as np
 import orjson
 
 from gcs.autopilots import Fleet
-from gcs.commands import Beat
-from gcs.interventions import EVERYBODY
 from gcs.links import refused
 from gcs.live import Live
-from gcs.messages import Encoder
+from gcs.roster import listed
 from gcs.telemetry import Swarm, observe
 from scenarios import Scenario
 from wire.modes import mode_name
@@ -35,7 +33,7 @@ def listen(live: Live, scenario: Scenario, *, as_json: bool, say: Callable[[str]
     if as_json:
         sys.stdout.write(orjson.dumps({"heard": heard, "missing": missing}).decode() + "\n")
     else:
-        sys.stdout.write(f"heard: {_ids(heard)}; missing: {_ids(missing)}\n")
+        sys.stdout.write(f"heard: {listed(heard) or 'none'}; missing: {listed(missing) or 'none'}\n")
     if missing and live.speaks_first:
         say("vehicles that wait to be spoken to stay silent: listening sends nothing")
     for words in (*_against(live, swarm), *([refused(live.rejections)] if missing else [])):
@@ -50,14 +48,8 @@ def before_arming(live: Live, scenario: Scenario, *, say: Callable[[str], None])
     Whoever waits to be spoken to hears our heartbeat, and nothing else.
     """
     swarm = Swarm.of(range(1, scenario.swarm.count + 1))
-    encoder, start_ns = Encoder(EVERYBODY), live.now()
-    beat_ns, until_ns = start_ns, start_ns + round(FIRST_S * 1e9)
-    while live.now() < until_ns:
-        if live.speaks_first and live.now() >= beat_ns:
-            beat_ns += 1_000_000_000
-            live.send(EVERYBODY, encoder.encode(Beat(), 0))
-        live.sleep_until(min(until_ns, live.now() + scenario.time.period_ns))
-        swarm = observe(swarm, live.receive())
+    for frames in live.hear(FIRST_S, step_ns=scenario.time.period_ns):
+        swarm = observe(swarm, frames)
     refusals = _against(live, swarm)
     if not refusals:
         for station in live.stations:
@@ -80,7 +72,3 @@ def _against(live: Live, swarm: Swarm) -> tuple[str, ...]:
             for row in np.flatnonzero(fleet.obeying(swarm))
         ),
     )
-
-
-def _ids(systems: list[int]) -> str:
-    return ", ".join(map(str, systems)) or "none"

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import NamedTuple
 
+from gcs.commands import Beat
 from gcs.link_quality import LinkQuality, Meter
-from gcs.messages import HEARTBEAT
+from gcs.messages import HEARTBEAT, Encoder
 from gcs.routes import IGNORED, Routes, of_station
 from wire.clock import WallClock
 from wire.connection import Connection
@@ -16,6 +17,9 @@ from wire.hub import Hub, Peer
 from wire.ids import AUTOPILOT
 from wire.signing import Signer
 
+EVERYBODY = 0
+"""A system id that no vehicle has: reaches those who wait to be spoken to."""
+BEAT_NS = 1_000_000_000
 STATIONS_AT_MOST = 16
 """Other ground stations that are remembered."""
 
@@ -38,14 +42,18 @@ class Live:
         *,
         speed: float = 1.0,
         signer: Signer | None = None,
+        namesakes: bool = False,
     ) -> None:
         """ids: whom to hear, None hears anybody;  signer: with it, only what is signed is heard.
 
+        namesakes: give vehicles of one system id that speak from several addresses a number each (gcs.routes), where
+        otherwise only the first is heard.
         Raises ConnectionRefused.
         """
         self._clock = WallClock(speed=speed)
         self._hub = Hub(connections, signer=signer)
         self._routes = Routes(ids)
+        self._namesakes = namesakes
         self._meters: dict[int, Meter] = {}
         self._frames: list[Frame] = []
         self._refused: Counter[str] = Counter()
@@ -64,6 +72,18 @@ class Live:
                 self._take(peer, frame)
             if seconds == 0.0:
                 return
+
+    def hear(self, seconds: float, *, step_ns: int) -> Iterator[list[Frame]]:
+        """Frames as they come, for so long. Who waits to be spoken to is sent our heartbeat, and nothing else."""
+        encoder = Encoder(EVERYBODY)
+        beat_ns = self.now()
+        until_ns = beat_ns + round(seconds * 1e9)
+        while (now_ns := self.now()) < until_ns:
+            if now_ns >= beat_ns:
+                beat_ns += BEAT_NS
+                self.send(EVERYBODY, encoder.encode(Beat(), 0))
+            self.sleep_until(min(until_ns, now_ns + step_ns))
+            yield self.receive()
 
     def receive(self) -> list[Frame]:
         """Frames of our vehicles since the last call."""
@@ -118,6 +138,8 @@ class Live:
     def _take(self, peer: Peer, frame: Frame) -> None:
         if frame.message == HEARTBEAT and of_station(frame):
             self._note(Station(frame.system, frame.component, _place(peer)))
+        if self._namesakes:
+            frame = self._routes.numbered(frame, peer)
         spoke = self._routes.peer(frame.system)
         refusal = self._routes.refusal(frame, peer)
         if refusal is not None:

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from gcs.routes import ALIVE_NS
 from gcs.telemetry import NEVER, Swarm, observe
 from wire.frames import Frame
 from wire.ids import AUTOPILOT
-
-ALIVE_NS = 3_000_000_000
-"""Three heartbeats: a vehicle that was silent for longer is not heard any more."""
 
 
 @dataclass(slots=True)
@@ -35,3 +33,8 @@ class Roster:
         """Whether a vehicle is heard still."""
         swarm = self.swarms.get(system)
         return swarm is not None and bool(now_ns - swarm.heartbeat_ns[0] <= ALIVE_NS)
+
+
+def listed(systems: Iterable[object]) -> str:
+    """For a sentence."""
+    return ", ".join(map(str, systems))

@@ -12,7 +12,11 @@ from wire.hub import Peer
 from wire.ids import AUTOPILOT
 
 ALIVE_NS = 3_000_000_000
-"""A peer that was silent for longer is gone: another address may speak for its vehicle."""
+"""Three heartbeats: a peer that was silent for longer is gone, and another address may speak for its vehicle."""
+
+NAMESAKE = 256
+"""The second vehicle that calls itself 7 has number 263, where namesakes are told apart, and the third 519."""
+NAMESAKES_AT_MOST = 4
 
 OTHER_SYSTEM = "other system"
 NOT_INTRODUCED = "no heartbeat yet"
@@ -70,7 +74,7 @@ class Routes:
             route.heard_ns = frame.time_ns
             return None
         introduced = introduces(frame)
-        if route is not None and frame.time_ns - route.heard_ns <= ALIVE_NS:
+        if route is not None and self._alive(frame.system, frame.time_ns):
             if introduced:
                 route.rival_ns = frame.time_ns
             return WRONG_ADDRESS
@@ -78,6 +82,17 @@ class Routes:
             return NOT_INTRODUCED
         self._routes[frame.system] = _Route(peer, frame.time_ns)
         return None
+
+    def numbered(self, frame: Frame, peer: Peer) -> Frame:
+        """The frame under its sender's own number: its system id, or 256 more for each namesake that came earlier.
+
+        Where more than NAMESAKES_AT_MOST are alive, the others have the number of the first.
+        """
+        numbers = range(frame.system, NAMESAKE * NAMESAKES_AT_MOST, NAMESAKE)
+        its = next((number for number in numbers if self.peer(number) == peer), None)
+        if its is None:
+            its = next((number for number in numbers if not self._alive(number, frame.time_ns)), frame.system)
+        return frame if its == frame.system else frame._replace(system=its)
 
     def peer(self, system: int) -> Peer | None:
         """Who speaks for a system; None before its first heartbeat."""
@@ -94,10 +109,23 @@ class Routes:
         return frozenset(
             system
             for system, route in self._routes.items()
-            if route.rival_ns is not None
-            and now_ns - route.rival_ns <= ALIVE_NS
-            and now_ns - route.heard_ns <= ALIVE_NS
+            if route.rival_ns is not None and now_ns - route.rival_ns <= ALIVE_NS and self._alive(system, now_ns)
         )
+
+    def _alive(self, system: int, now_ns: int) -> bool:
+        route = self._routes.get(system)
+        return route is not None and now_ns - route.heard_ns <= ALIVE_NS
+
+
+def id_of(number: int) -> int:
+    """The system id under which the vehicle of this number goes."""
+    return number % NAMESAKE
+
+
+def name_of(number: int) -> str:
+    """As people call it."""
+    place, system = divmod(number, NAMESAKE)
+    return str(system) if place == 0 else f"{system} (no. {place + 1} of that id)"
 
 
 def introduces(frame: Frame) -> bool:

@@ -1,5 +1,6 @@
 """Stepping in without a flight: vehicles in the air are landed, held or killed by whoever hears them."""
 
+import math
 from itertools import pairwise
 
 import pytest
@@ -12,9 +13,11 @@ from gcs.interventions import HOLDING, KILLING, LANDING, Intervention
 from gcs.lockstep import Lockstep
 from gcs.loop import fly
 from gcs.messages import Encoder
+from gcs.routes import Routes
 from gcs.telemetry import Swarm, observe
 from scenarios import load
 from wire.frames import Framer, Sender, decode
+from wire.hub import Peer
 from wire.modes import PX4_MODES, mode_name
 
 TWO = (*SHORT, "swarm.rows=1", "swarm.columns=2", "swarm.leaders=[1]")
@@ -99,6 +102,58 @@ def test_kill_stops_rotors_in_the_air_and_of_nobody_else(autopilot):
     assert seen(world).armed.tolist() == [True, False]
 
 
+class Namesakes:
+    """Several worlds whose vehicles call themselves alike, each behind an address of its own."""
+
+    def __init__(self, *worlds):
+        self._worlds = {Peer(None, ("127.0.0.1", port)): world for port, world in enumerate(worlds)}
+        self._routes = Routes(None)
+
+    def now(self):
+        return max(world.now() for world in self._worlds.values())
+
+    def sleep_until(self, time_ns):
+        for world in self._worlds.values():
+            world.sleep_until(time_ns)
+
+    def receive(self):
+        arrived = [(peer, frame) for peer, world in self._worlds.items() for frame in world.receive()]
+        numbered = [(peer, self._routes.numbered(frame, peer)) for peer, frame in arrived]
+        return [frame for peer, frame in numbered if self._routes.refusal(frame, peer) is None]
+
+    def send(self, number, frame):
+        if self._routes.peer(number) is not None:
+            self._worlds[self._routes.peer(number)].send(number % 256, frame)
+
+
+@pytest.mark.parametrize("only", [(), (1, 2)], ids=["everybody", "named"])
+def test_vehicles_of_one_id_are_all_landed_though_one_of_them_stands_on_the_ground(only):
+    above, said = in_the_air(), []
+    below = on_the_ground()
+    below.sleep_until(above.now())
+    link = Namesakes(below, above)
+    outcome = Intervention(LANDING, link, link, said.append, only=only).carry_out()
+    assert outcome.done == (1, 2, 257, 258)
+    assert not seen(above).armed.any()
+    assert "vehicle 1 (no. 2 of that id): on the ground, rotors off" in said
+
+
+def test_of_two_with_one_id_neither_is_taken_for_the_other():
+    above, stubborn = in_the_air(), Stubborn(system=2)
+    stubborn.sleep_until(above.now())
+    link = Namesakes(above, stubborn)
+    outcome = Intervention(LANDING, link, link, say=str).carry_out()
+    assert outcome.done == (1, 258)
+    assert outcome.not_done == {2: "is still armed, in mode 0"}
+
+
+def test_hold_says_of_those_on_the_ground_that_they_are_there():
+    world, said = on_the_ground(), []
+    assert Intervention(HOLDING, world, world, said.append).carry_out().all_done
+    assert "vehicle 1: is not in the air, rotors off" in said
+    assert not any("holds" in words for words in said)
+
+
 def test_whoever_is_heard_is_told_at_once_and_no_more_than_once_a_second():
     world = in_the_air()
     link = Overheard(world)
@@ -167,9 +222,9 @@ def test_where_nobody_is_nothing_is_done():
 class Stubborn:
     """A vehicle of an unknown kind that never obeys; and a clock."""
 
-    def __init__(self, *, until_s=1e9):
-        self.time_ns, self.sent = 0, []
-        self._until_ns, self._sender = until_s * 1e9, Sender(7, 1)
+    def __init__(self, *, until_s=math.inf, system=7):
+        self.time_ns, self.sent, self._beat_ns = 0, [], 0
+        self._until_ns, self._sender = until_s * 1e9, Sender(system, 1)
 
     def now(self):
         return self.time_ns
@@ -178,8 +233,9 @@ class Stubborn:
         self.time_ns = time_ns
 
     def receive(self):
-        if self.time_ns % 10**9 or self.time_ns > self._until_ns:
+        if not self._beat_ns <= self.time_ns <= self._until_ns:
             return []
+        self._beat_ns = self.time_ns + 10**9
         beat = dialect.MAVLink_heartbeat_message(2, 0, dialect.MAV_MODE_FLAG_SAFETY_ARMED, 0, 4, 3)
         return Framer().frames(self.time_ns, self._sender.pack(beat))
 

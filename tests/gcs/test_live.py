@@ -296,6 +296,29 @@ def test_what_is_sent_goes_to_where_the_vehicle_speaks_from_and_before_that_nowh
 
 
 @pytest.mark.wall_clock
+def test_where_namesakes_are_told_apart_both_are_heard_and_each_is_sent_its_own():
+    port = free_port()
+    with (
+        closing(Live([Connection("udpin", HOST, port)], None, speed=100, namesakes=True)) as live,
+        closing(Vehicles(port)) as one,
+        closing(Vehicles(port)) as other,
+    ):
+        one.beat((1,))
+        after(live, 1.0)
+        other.beat((1,))
+        one.beat((1,))
+        assert sorted(frame.system for frame in after(live, 1.0)) == [1, 257]
+        live.send(1, b"to one")
+        live.send(257, b"to the other")
+        time.sleep(0.01)
+        one.listen()
+        other.listen()
+        assert [data for data, _ in one.received] == [b"to one"]
+        assert [data for data, _ in other.received] == [b"to the other"]
+        assert live.rejections == {}
+
+
+@pytest.mark.wall_clock
 def test_a_vehicle_is_heard_over_a_crowd_that_fills_the_port_it_is_known_on(link):
     live, port = link
     with closing(Vehicles(port)) as known, closing(Vehicles(port)) as unknown, closing(Vehicles(port)) as crowd:

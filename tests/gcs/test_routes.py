@@ -3,7 +3,17 @@
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from gcs.routes import ALIVE_NS, NOT_INTRODUCED, OTHER_SYSTEM, WRONG_ADDRESS, Routes, introduces
+from gcs.routes import (
+    ALIVE_NS,
+    NAMESAKES_AT_MOST,
+    NOT_INTRODUCED,
+    OTHER_SYSTEM,
+    WRONG_ADDRESS,
+    Routes,
+    id_of,
+    introduces,
+    name_of,
+)
 from wire.frames import Framer, Sender
 from wire.hub import Peer
 
@@ -99,3 +109,42 @@ def test_any_frame_keeps_an_address_alive_and_after_silence_a_heartbeat_from_els
     assert routes.peers == {THERE}
     assert routes.refusal(position(time_ns=SECOND + ALIVE_NS + 2), HERE) == WRONG_ADDRESS
     assert routes.duplicates(SECOND + ALIVE_NS + 2) == frozenset()
+
+
+def test_where_namesakes_are_told_apart_each_has_a_number_of_its_own_and_keeps_it():
+    routes = Routes(None)
+
+    def number(frame, peer):
+        frame = routes.numbered(frame, peer)
+        assert routes.refusal(frame, peer) is None
+        return frame.system
+
+    peers = [Peer(None, ("127.0.0.1", port)) for port in range(NAMESAKES_AT_MOST)]
+    assert [number(beat(system=7), peer) for peer in peers] == [7, 263, 519, 775]
+    assert [number(position(system=7), peer) for peer in reversed(peers)] == [775, 519, 263, 7]
+    assert routes.duplicates(0) == frozenset()
+    assert [routes.peer(7), routes.peer(263)] == peers[:2]
+
+
+def test_more_namesakes_than_can_be_told_apart_are_a_duplicate_of_the_first():
+    routes = Routes(None)
+    for port in range(NAMESAKES_AT_MOST + 1):
+        peer = Peer(None, ("127.0.0.1", port))
+        routes.refusal(routes.numbered(beat(system=7), peer), peer)
+    assert routes.duplicates(0) == {7}
+
+
+def test_a_vehicle_that_speaks_from_elsewhere_after_its_silence_keeps_its_number_and_a_namesake_its_own():
+    routes = Routes(None)
+    later = ALIVE_NS + 1
+    for peer in (HERE, THERE):
+        routes.refusal(routes.numbered(beat(), peer), peer)
+    assert routes.numbered(beat(time_ns=later), THERE).system == 257
+    assert routes.numbered(beat(time_ns=later), Peer(None, ("127.0.0.1", 3))).system == 1
+
+
+@pytest.mark.parametrize(
+    ("number", "system", "name"), [(7, 7, "7"), (263, 7, "7 (no. 2 of that id)"), (255, 255, "255")]
+)
+def test_a_number_names_its_system_id_and_the_place_among_namesakes(number, system, name):
+    assert (id_of(number), name_of(number)) == (system, name)
