@@ -9,6 +9,7 @@ from pathlib import Path
 
 from gcs import console
 from gcs.choices import BadUsageError, confirmed
+from gcs.control_socket import ControlSocket
 from gcs.degrade import Degraded, degrading
 from gcs.events import Rating
 from gcs.flight import Flight
@@ -20,7 +21,6 @@ from gcs.operator import Operator
 from gcs.output import PICTURE, make_room, output_folder, room
 from gcs.progress import Display
 from gcs.rates import positions_per_tick
-from gcs.reach import ControlSocket
 from gcs.session import flown
 from gcs.summary import Reception, Summary
 from gcs.supervision import Supervision

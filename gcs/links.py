@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import errno
 import time
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
+from gcs.cards import under_way
+from gcs.console import say
 from gcs.live import Live
-from gcs.reach import flying
 from wire.connection import Connection, ConnectionRefused, parse
-from wire.signing import Signer, read_key
+from wire.signing import Signer, SigningKeyError, read_key
 
 LISTENS, FLIES, STEPS_IN = "listens", "flies", "steps-in"
 """What a program does with a signed link: each has a link id and a memory of its own, so that none forges another."""
 AGAIN_S = 0.1
+GIVEN_BACK_S = 10.0
+"""Whoever steps in waits so long for a port: `gcs vehicles`, or a flight that draws its picture, will give it back."""
 _LINK_IDS = {FLIES: 0, STEPS_IN: 1, LISTENS: 2}
 
 
@@ -35,29 +39,28 @@ def opened(
     purpose: str,
     speed: float = 1.0,
     signing_key: Path | None = None,
-    patience_s: float = 0.0,
 ) -> Iterator[Live]:
     """The vehicles behind these connections, until the block ends.
 
-    patience_s: to wait for a port that somebody else is about to give back.
     Raises ConnectionRefused and SigningKeyError.
     """
     wanted = list(connections)
     signer = _signer(signing_key, purpose)
-    until_s = time.monotonic() + patience_s
+    until_s = time.monotonic() + (GIVEN_BACK_S if purpose == STEPS_IN else 0.0)
+    waits = False
     while True:
         try:
-            live = Live(wanted, ids, speed=speed, signer=signer)
+            live = Live(wanted, ids, speed=speed, signer=signer, namesakes=purpose == STEPS_IN)
+            break
         except ConnectionRefused as error:
-            if time.monotonic() < until_s:
-                time.sleep(AGAIN_S)
-                continue
-            flight = flying(wanted)
-            if flight is None:
+            if not _in_use(error):
                 raise
-            hint = f"the flight of process {flight.process} has it; gcs land, hold, kill and take-back reach that one"
-            raise ConnectionRefused(f"{error}; {hint}") from None
-        break
+            if time.monotonic() >= until_s:
+                raise ConnectionRefused(f"{error}; {_who_has(wanted)}") from None
+            if not waits:
+                waits = True
+                say(f"{error}; trying again for {GIVEN_BACK_S:g} s")
+            time.sleep(AGAIN_S)
     try:
         yield live
     finally:
@@ -72,9 +75,30 @@ def refused(rejections: Mapping[str, int]) -> str | None:
     return f"frames refused: {told}" if told else None
 
 
+def _in_use(error: ConnectionRefused) -> bool:
+    """Whether somebody else has the port, as the system said."""
+    cause = error.__context__
+    return isinstance(cause, OSError) and cause.errno in (errno.EADDRINUSE, errno.EBUSY, errno.EAGAIN)
+
+
+def _who_has(connections: list[Connection]) -> str:
+    flights = under_way(connections)
+    if not flights:
+        return "end what listens there"
+    processes = " and ".join(str(flight.process) for flight in flights)
+    return f"the flight of process {processes} has it; gcs land, hold, kill and take-back reach that one"
+
+
 def _signer(path: Path | None, purpose: str) -> Signer | None:
-    """Who only listens keeps no memory: it writes nothing."""
+    """Who only listens keeps no memory: it writes nothing. Who steps in does so without one, if it must."""
     if path is None:
         return None
+    key, link = read_key(path), _LINK_IDS[purpose]
     memory = None if purpose == LISTENS else path.with_name(f"{path.name}.{purpose}")
-    return Signer(read_key(path), memory=memory, link=_LINK_IDS[purpose])
+    try:
+        return Signer(key, memory=memory, link=link)
+    except SigningKeyError as error:
+        if purpose != STEPS_IN:
+            raise
+        say(f"gcs: {error}; going on without it, by this computer's clock")
+        return Signer(key, link=link)

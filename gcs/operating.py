@@ -1,21 +1,20 @@
-"""`gcs land`, `hold`, `kill` and `take-back`: through the flight that has the link, or by themselves."""
+"""`gcs land`, `hold`, `kill` and `take-back`: through the flights that have the links, or by themselves."""
 
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
+from gcs.cards import Card, under_way
 from gcs.choices import BadUsageError
-from gcs.commands import Beat, RequestStream
+from gcs.commands import RequestStream
 from gcs.console import asked, say
 from gcs.events import HOLD, LAND, kill, take_back
 from gcs.flight_state import Phase
 from gcs.interventions import (
-    EVERYBODY,
     HEAR_S,
     HOLDING,
     KILLING,
@@ -29,22 +28,18 @@ from gcs.interventions import (
 from gcs.links import STEPS_IN, opened, refused, understood
 from gcs.live import Live
 from gcs.messages import LOCAL_POSITION_NED, Encoder
-from gcs.reach import STATUS, Call, Ended, Flying, flying
-from gcs.roster import Roster
+from gcs.reach import Call, Ended, Refused, Unanswered
+from gcs.roster import Roster, listed
+from gcs.routes import id_of, name_of
+from gcs.standing import Standing
 from wire.connection import Connection
 
 DONE, BAD_INPUT, NOT_DONE = 0, 2, 3
-"""Exit codes."""
-POLL_S = 0.2
-TELL_S = 5.0
+"""Exit codes; of several links the worst."""
 RETURN_S = 8.0
 """A vehicle that was taken back flies our set-points within this, or stays whose it is."""
-GIVES_BACK_S = 10.0
-"""A flight that has ended draws its picture, and then gives the link back."""
 _STILL, _STEERED = ("hold", "brake"), ("offboard", "guided")
-
-Status = Mapping[str, Any]
-"""What a flight says of itself (gcs.reach)."""
+_COMING_DOWN = (Phase.LAND.value, Phase.DONE.value)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,27 +55,44 @@ class Links:
         return Links(tuple(understood(texts)), signing_key)
 
     @property
-    def flight(self) -> Flying | None:
-        """The flight of this user's that has one of them."""
-        return flying(self.connections)
+    def flights(self) -> tuple[Card, ...]:
+        """Flights of this user's that have any of them."""
+        return under_way(self.connections)
+
+    def only_flight(self, word: str) -> Card | None:
+        """The flight that has them all; None where no flight has any. Raises BadUsageError."""
+        flights = self.flights
+        if len(flights) > 1 or (flights and self.without(flights).connections):
+            processes = " and ".join(str(flight.process) for flight in flights)
+            raise BadUsageError(f"--link: not all of them are one flight's (process {processes}): {word} one at a time")
+        return flights[0] if flights else None
+
+    def of_flight(self, flight: Card) -> Links:
+        """Those that it has."""
+        return replace(self, connections=tuple(link for link in self.connections if flight.has(link)))
+
+    def without(self, flights: Iterable[Card]) -> Links:
+        """Those that none of these has."""
+        taken = [link for flight in flights for link in self.of_flight(flight).connections]
+        return replace(self, connections=tuple(link for link in self.connections if link not in taken))
 
 
 def land(links: Links, only: tuple[int, ...]) -> int:
     """Land everybody who is heard, or these. Exit code."""
-    over = (Phase.LAND.value, Phase.DONE.value)
-    return _order(links, LANDING, only, LAND, lambda status: status["phase"] in over and not _ours(status))
+    return _order(links, LANDING, only, LAND, lambda standing: standing.phase in _COMING_DOWN and not standing.ours)
 
 
 def hold(links: Links, only: tuple[int, ...]) -> int:
     """Have everybody who is heard, or these, stay where they are. Exit code."""
-
-    def still(status: Status) -> bool:
-        return status["phase"] == Phase.HOLD.value and all(one["mode"] in _STILL for one in _ours(status).values())
-
-    code = _order(links, HOLDING, only, HOLD, still)
-    if code == DONE and links.flight is None:
-        say("from now on they hear no ground station: what they do then, and how soon, their failsafe parameters say")
-    return code
+    return _order(
+        links,
+        HOLDING,
+        only,
+        HOLD,
+        lambda standing: (
+            standing.phase == Phase.HOLD.value and all(one.mode in _STILL for one in standing.ours.values())
+        ),
+    )
 
 
 def kill_vehicles(links: Links, only: tuple[int, ...], *, yes: bool) -> int:
@@ -88,39 +100,45 @@ def kill_vehicles(links: Links, only: tuple[int, ...], *, yes: bool) -> int:
     asks = not (only and yes)
     if asks and not sys.stdin.isatty():
         raise BadUsageError("kill without a terminal needs --vehicle and --yes: whoever is in the air falls")
-    flight = links.flight
+    flight = links.only_flight("kill")
     if flight is not None:
         return _kill_in_flight(flight, only, asks=asks)
     with opened(links.connections, None, purpose=STEPS_IN, signing_key=links.signing_key) as live:
         roster = _survey(live)
         missing = [system for system in only if system not in roster.swarms]
         doomed = {
-            system: described(swarm)
-            for system, swarm in sorted(roster.swarms.items())
-            if swarm.armed[0] and (not only or system in only)
+            number: described(swarm)
+            for number, swarm in sorted(roster.swarms.items())
+            if swarm.armed[0] and (not only or id_of(number) in only)
         }
         if missing or not roster.swarms:
-            say(f"gcs: not heard: {_listed(missing) or 'anybody'}{_refused(live)}")
+            say(f"gcs: not heard: {listed(missing) or 'anybody'}{_refused(live)}")
         if not doomed:
             say("nobody is heard there whose rotors run")
             return NOT_DONE if missing or not roster.swarms else DONE
         if asks and not _twice_confirmed(doomed):
             return BAD_INPUT
-        outcome = Intervention(KILLING, live, live, say, only=tuple(doomed), roster=roster).carry_out()
-    return max(_told(KILLING, outcome), NOT_DONE if missing else DONE)
+        named = {id_of(number) for number in doomed}
+        outcome = Intervention(KILLING, live, live, say, only=named, roster=roster).carry_out()
+        return max(_told(KILLING, outcome, live), NOT_DONE if missing else DONE)
 
 
 def back_to_the_flight(links: Links, system: int) -> int:
     """Give a vehicle that a pilot, or its autopilot, took from a running flight back to it. Exit code."""
-    flight = links.flight
+    flight = links.only_flight("take-back")
     if flight is None:
         raise BadUsageError("no flight of yours has this link: take-back is for a flight that is under way")
 
-    def back(status: Status) -> bool:
-        one = status["vehicles"].get(str(system), {})
-        return not one.get("released", True) and one.get("mode") in _STEERED
+    def back(standing: Standing) -> bool:
+        one = standing.vehicles.get(system)
+        return one is not None and not one.released and one.mode in _STEERED
 
-    found = _through(flight, (take_back(system),), back, patience_s=RETURN_S)
+    try:
+        with Call(flight) as call:
+            call.tell(take_back(system))
+            found = call.watch(back, patience_s=RETURN_S)
+    except Ended:
+        found = False
     if found:
         say(f"vehicle {system} flies with the others again")
         return DONE
@@ -128,140 +146,129 @@ def back_to_the_flight(links: Links, system: int) -> int:
     return NOT_DONE
 
 
-def _order(links: Links, order: Order, only: tuple[int, ...], word: str, done: Callable[[Status], bool]) -> int:
-    """Through the flight that has the link; by ourselves where there is none, or where it ends before all is done."""
-    flight = links.flight
-    if flight is not None:
-        if only:
-            raise BadUsageError(
-                f"--vehicle: the flight of process {flight.process} has this link, and {order.word}s as a whole"
-            )
-        others = set[str]()
+def _order(links: Links, order: Order, only: tuple[int, ...], word: str, done: Callable[[Standing], bool]) -> int:
+    """Through each flight that has a link; by ourselves where none has, or where it ends before all is done.
 
-        def settled(status: Status) -> bool:
-            others.update(_armed(status).keys() - _ours(status).keys())
-            return done(status)
+    All flights are told before any is watched, and one that does not listen keeps no other from being told.
+    """
+    flights = links.flights
+    if flights and only:
+        raise BadUsageError(
+            f"--vehicle: the flight of process {flights[0].process} has this link, and {order.word}s as a whole, "
+            f"without --vehicle. One alone: its own remote control takes it from the flight, `gcs kill` drops it"
+        )
+    codes, ended, calls = [DONE], list[Card](), list[Call]()
+    with ExitStack() as stack:
+        for flight in flights:
+            try:
+                call = stack.enter_context(Call(flight))
+                call.tell(word)
+            except (Unanswered, Refused) as error:
+                codes.append(_said(error))
+            except Ended:
+                ended.append(flight)
+            else:
+                calls.append(call)
+        alone = links.without({*flights} - {*ended})
+        if alone.connections:
+            codes.append(_by_ourselves(alone, order, only))
+        for call in calls:
+            try:
+                codes.append(_watched(call, order, done))
+            except (Unanswered, Refused) as error:
+                codes.append(_said(error))
+            except Ended:
+                say("the flight has ended before that; going on without it")
+                codes.append(_by_ourselves(links.of_flight(call.flight), order, only))
+    return max(codes)
 
-        found = _through(flight, (word,), settled, patience_s=order.patience_s)
-        if found is not None:
-            theirs = f" (left in other hands: {_listed(sorted(map(int, others)))})" if others else ""
-            say(f"{order.word}: done{theirs}" if found else f"gcs: {order.word}: not everybody has{theirs}")
-            return DONE if found and not others else NOT_DONE
-        say("the flight has ended before that; going on without it")
-    patience_s = 0.0 if flight is None else GIVES_BACK_S
-    with opened(
-        links.connections, None, purpose=STEPS_IN, signing_key=links.signing_key, patience_s=patience_s
-    ) as live:
+
+def _said(error: Unanswered | Refused) -> int:
+    say(f"gcs: {error}")
+    return NOT_DONE if isinstance(error, Unanswered) else BAD_INPUT
+
+
+def _watched(call: Call, order: Order, done: Callable[[Standing], bool]) -> int:
+    """Exit code. Raises Unanswered, Refused and Ended."""
+    others = set[int]()
+
+    def settled(standing: Standing) -> bool:
+        others.update(standing.armed.keys() - standing.ours.keys())
+        return done(standing)
+
+    found = call.watch(settled, patience_s=order.patience_s)
+    theirs = f" (left in other hands: {listed(sorted(others))})" if others else ""
+    say(f"{order.word}: done{theirs}" if found else f"gcs: {order.word}: not everybody has{theirs}")
+    return DONE if found and not others else NOT_DONE
+
+
+def _by_ourselves(links: Links, order: Order, only: tuple[int, ...]) -> int:
+    with opened(links.connections, None, purpose=STEPS_IN, signing_key=links.signing_key) as live:
         outcome = Intervention(order, live, live, say, only=only).carry_out()
         if not outcome.done:
             say(f"gcs: nobody has{_refused(live)}" if outcome.not_done else f"gcs: nobody is heard{_refused(live)}")
-    return _told(order, outcome)
+        code = _told(order, outcome, live)
+    if code == DONE and order is HOLDING:
+        say("from now on they hear no ground station: what they do then, and how soon, their failsafe parameters say")
+    return code
 
 
-def _told(order: Order, outcome: Outcome) -> int:
-    for system, why in outcome.not_done.items():
-        say(f"gcs: {order.word}: vehicle {system} {why}")
+def _told(order: Order, outcome: Outcome, live: Live) -> int:
+    for number, why in outcome.not_done.items():
+        say(f"gcs: {order.word}: vehicle {name_of(number)} {why}")
+    for system in (crowded := live.duplicates):
+        say(f"gcs: {order.word}: more vehicles call themselves {system} than can be told apart: not all were told")
     if outcome.all_done:
-        say(f"{order.word}: done by {_listed(outcome.done)}")
-    return DONE if outcome.all_done else NOT_DONE
+        say(f"{order.word}: done by {listed(map(name_of, outcome.done))}")
+    return DONE if outcome.all_done and not crowded else NOT_DONE
 
 
-def _kill_in_flight(flight: Flying, only: tuple[int, ...], *, asks: bool) -> int:
-    with Call(flight) as call:
-        vehicles = call.ask(STATUS)["vehicles"]
-    missing = [system for system in only if str(system) not in vehicles]
-    if missing:
-        raise BadUsageError(f"--vehicle {_listed(missing)}: the flight has {_listed(map(int, vehicles))}")
-    doomed = {
-        int(system): _described(one)
-        for system, one in vehicles.items()
-        if one["armed"] and (not only or int(system) in only)
-    }
-    if not doomed:
-        say("nobody is there whose rotors run")
-        return DONE
-    if asks and not _twice_confirmed(doomed):
-        return BAD_INPUT
-
-    def fallen(status: Status) -> bool:
-        return not any(status["vehicles"][str(system)]["armed"] for system in doomed)
-
-    found = _through(flight, tuple(kill(system) for system in doomed), fallen, patience_s=KILLING.patience_s)
-    say(f"kill: done, {_listed(doomed)}" if found else "gcs: kill: not every rotor is seen to stand")
+def _kill_in_flight(flight: Card, only: tuple[int, ...], *, asks: bool) -> int:
+    try:
+        with Call(flight) as call:
+            vehicles = call.standing().vehicles
+        missing = [system for system in only if system not in vehicles]
+        if missing:
+            raise BadUsageError(f"--vehicle {listed(missing)}: the flight has {listed(vehicles)}")
+        doomed = {system: str(one) for system, one in vehicles.items() if one.armed and (not only or system in only)}
+        if not doomed:
+            say("nobody is there whose rotors run")
+            return DONE
+        if asks and not _twice_confirmed(doomed):
+            return BAD_INPUT
+        with Call(flight) as call:
+            for system in doomed:
+                call.tell(kill(system))
+            found = call.watch(
+                lambda standing: not standing.armed.keys() & doomed.keys(), patience_s=KILLING.patience_s
+            )
+    except Ended:
+        say("gcs: the flight has ended; give this command again")
+        return NOT_DONE
+    say(f"kill: done, {listed(doomed)}" if found else "gcs: kill: not every rotor is seen to stand")
     return DONE if found else NOT_DONE
-
-
-def _through(
-    flight: Flying, words: tuple[str, ...], done: Callable[[Status], bool], *, patience_s: float
-) -> bool | None:
-    """Hand words to a flight and watch until it is done; None where it ends before that. Raises Unanswered, Refused."""
-    with Call(flight) as call:
-        try:
-            for word in words:
-                tick = call.ask(word)["tick"]
-                say(f"the flight of process {flight.process} takes {word!r} at tick {tick}")
-            return _watched(call, done, patience_s=patience_s)
-        except Ended:
-            return None
-
-
-def _watched(call: Call, done: Callable[[Status], bool], *, patience_s: float) -> bool | None:
-    began = told = time.monotonic()
-    while (now := time.monotonic()) - began < patience_s:
-        time.sleep(POLL_S)
-        status = call.ask(STATUS)
-        if done(status):
-            return True
-        if status.get("over"):
-            return None
-        if now - told >= TELL_S:
-            told = now
-            flying_still = ", ".join(f"{system} ({_described(one)})" for system, one in _armed(status).items())
-            say(f"{status['phase']}: {flying_still}")
-    return False
-
-
-def _armed(status: Status) -> dict[str, Mapping[str, Any]]:
-    return {system: one for system, one in status["vehicles"].items() if one["armed"]}
-
-
-def _ours(status: Status) -> dict[str, Mapping[str, Any]]:
-    """Who has its rotors running, and is the flight's."""
-    return {system: one for system, one in _armed(status).items() if not one["released"]}
-
-
-def _described(one: Mapping[str, Any]) -> str:
-    """A vehicle of a flight's status in a few words."""
-    place = "height unknown" if one["height_m"] is None else f"{one['height_m']:.1f} m up"
-    return f"{one['mode']}, {place}{', in other hands' if one['released'] else ''}"
 
 
 def _survey(live: Live) -> Roster:
     """Hear who is there, and ask how high."""
-    roster = Roster()
-    until_ns = live.now() + round(HEAR_S * 1e9)
-    asked_of = dict[int, Encoder]()
-    everybody = Encoder(EVERYBODY)
-    while live.now() < until_ns:
-        if not roster.swarms and live.speaks_first:
-            live.send(EVERYBODY, everybody.encode(Beat(), 0))
-        live.sleep_until(min(until_ns, live.now() + STEP_NS))
-        roster.take(live.receive())
-        for system in roster.swarms.keys() - asked_of.keys():
-            asked_of[system] = Encoder(system)
-            live.send(system, asked_of[system].encode(RequestStream(LOCAL_POSITION_NED, 0.5), 0))
+    roster, asked_of = Roster(), set[int]()
+    for frames in live.hear(HEAR_S, step_ns=STEP_NS):
+        roster.take(frames)
+        for number in roster.swarms.keys() - asked_of:
+            asked_of.add(number)
+            live.send(number, Encoder(id_of(number)).encode(RequestStream(LOCAL_POSITION_NED, 0.5), 0))
     return roster
 
 
 def _twice_confirmed(doomed: Mapping[int, str]) -> bool:
     """Whoever is in the air falls: a word, and then the numbers of those who will."""
-    for system, words in doomed.items():
-        say(f"vehicle {system}: {words}")
+    for number, words in doomed.items():
+        say(f"vehicle {name_of(number)}: {words}")
     if asked("Their rotors will stop, and who is in the air falls. Type KILL to go on: ") != "KILL":
         say("gcs: nothing was stopped")
         return False
-    numbers = " ".join(map(str, doomed))
-    if (asked(f"Type the numbers of those that will fall, {numbers}: ") or "").split() != numbers.split():
+    systems = " ".join(dict.fromkeys(str(id_of(number)) for number in doomed))
+    if (asked(f"Type the numbers of those that will fall, {systems}: ") or "").split() != systems.split():
         say("gcs: nothing was stopped")
         return False
     return True
@@ -270,7 +277,3 @@ def _twice_confirmed(doomed: Mapping[int, str]) -> bool:
 def _refused(live: Live) -> str:
     words = refused(live.rejections)
     return "" if words is None else f" ({words})"
-
-
-def _listed(systems: Iterable[int]) -> str:
-    return ", ".join(map(str, systems))

@@ -1,123 +1,33 @@
-"""`gcs land`, `hold`, `kill` and `take-back` while a flight has the link: through its socket, and to its end."""
+"""`gcs land`, `hold`, `kill` and `take-back` while flights have the links: through their sockets, and to their end."""
 
 import os
 import pty
-import signal
 import socket
-import stat
 import subprocess
-import tempfile
 import threading
 import time
-from contextlib import closing, contextmanager
-from pathlib import Path
-from types import SimpleNamespace
+from contextlib import closing, contextmanager, suppress
 
-import orjson
 import pytest
-from flights import FDM, GCS, start
+from flights import GCS
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+from standing import LINK, Fleet, flying
 
-from gcs import operating
-from gcs.events import killed, taken_back
+from gcs import interventions, links, operating
+from gcs.control_socket import ControlSocket
 from gcs.flight_state import Phase
-from gcs.reach import Call, ControlSocket, Refused, flying
-from gcs.telemetry import Swarm
-from wire.connection import Connection, parse
-from wire.modes import PX4, PX4_MODES
+from wire.connection import parse
+from wire.frames import Sender
+from wire.modes import PX4_MODES
+from wire.signing import SigningKeyError
 
-HOST, LINK = "127.0.0.1", "udpin:0.0.0.0:14999"
-
-
-@pytest.fixture(autouse=True)
-def runtime(monkeypatch):
-    """A runtime directory of the test's own; short, because the names of sockets must be."""
-    with tempfile.TemporaryDirectory(prefix="rt-") as folder:
-        monkeypatch.setenv("XDG_RUNTIME_DIR", folder)
-        yield Path(folder)
-
-
-class Fleet:
-    """Three vehicles in the air as a flight tells of them, which do what they are told two ticks later."""
-
-    def __init__(self):
-        self.swarm = Swarm.of((1, 2, 3))
-        self.swarm.heartbeat_ns[:] = 1
-        self.swarm.autopilot[:] = PX4
-        self.swarm.armed[:] = True
-        self.swarm.position_ned[:] = 0.0, 0.0, -9.75
-        self.released = self.swarm.armed & False
-        self.phase = Phase.MISSION
-        self.mode("offboard")
-
-    def mode(self, name):
-        self.swarm.custom_mode[~self.released] = PX4_MODES[name].custom_mode
-
-    def obey(self, word):
-        if word == "land":
-            self.phase = Phase.LAND
-            self.swarm.armed[~self.released] = False
-        elif word == "hold":
-            self.phase = Phase.HOLD
-            self.mode("hold")
-        elif killed(word):
-            self.swarm.armed[killed(word) - 1] = False
-        else:
-            self.released[taken_back(word) - 1] = False
-            self.mode("offboard")
-
-    def tick(self):
-        return SimpleNamespace(
-            swarm=self.swarm,
-            state=SimpleNamespace(released=self.released),
-            diagnosis=SimpleNamespace(phase=self.phase),
-        )
-
-
-@contextmanager
-def under_way(fleet=None, *, ends_after=None):
-    """A flight that turns a hundred times a second: the words it was told. ends_after: ticks after its first word."""
-    fleet, words, over = fleet or Fleet(), [], threading.Event()
-
-    def turn():
-        with ControlSocket(parse(LINK), (1, 2, 3), say=str) as control:
-            due = []
-            while not over.is_set():
-                control.tick(fleet.tick())
-                heard = control.take()
-                words.extend(heard)
-                due.append(heard)
-                for word in due[-3] if len(due) > 2 else ():
-                    fleet.obey(word)
-                if ends_after is not None and words and sum(map(bool, due)) and len(due) - first(due) > ends_after:
-                    control.tick(fleet.tick())
-                    return
-                time.sleep(0.01)
-
-    thread = threading.Thread(target=turn)
-    thread.start()
-    until(lambda: flying(parse(LINK)))
-    try:
-        yield words
-    finally:
-        over.set()
-        thread.join()
-
-
-def first(due):
-    return next(place for place, words in enumerate(due) if words)
-
-
-def until(true, *, within_s=5.0):
-    deadline = time.monotonic() + within_s
-    while not true():
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
+pytestmark = pytest.mark.usefixtures("cards")
 
 
 @pytest.mark.wall_clock
 @pytest.mark.parametrize("word", ["land", "hold"])
 def test_a_flight_takes_the_word_at_a_tick_and_is_watched_until_it_is_done(gcs, word):
-    with under_way() as words:
+    with flying() as words:
         code, out, err = gcs(word, "--link", LINK)
     assert (code, out, words) == (0, "", [word])
     assert f"the flight of process {os.getpid()} takes '{word}' at tick " in err
@@ -126,7 +36,7 @@ def test_a_flight_takes_the_word_at_a_tick_and_is_watched_until_it_is_done(gcs, 
 
 @pytest.mark.wall_clock
 def test_a_flight_that_ends_meanwhile_tells_how_it_ended(gcs):
-    with under_way(ends_after=5) as words:
+    with flying(ends_after=5) as words:
         code, _, err = gcs("land", "--link", "udpin:127.0.0.1:14999")
     assert (code, words) == (0, ["land"])
     assert err.endswith("land: done\n")
@@ -137,7 +47,7 @@ def test_a_vehicle_in_other_hands_is_left_there_and_the_exit_code_says_that_not_
     fleet = Fleet()
     fleet.released[1] = True
     fleet.swarm.custom_mode[1] = PX4_MODES["position"].custom_mode
-    with under_way(fleet):
+    with flying(fleet):
         code, _, err = gcs("land", "--link", LINK)
     assert code == 3
     assert err.endswith("land: done (left in other hands: 2)\n")
@@ -147,7 +57,7 @@ def test_a_vehicle_in_other_hands_is_left_there_and_the_exit_code_says_that_not_
 @pytest.mark.wall_clock
 def test_kill_names_one_vehicle_and_stops_no_other(gcs):
     fleet = Fleet()
-    with under_way(fleet) as words:
+    with flying(fleet) as words:
         code, _, err = gcs("kill", "--link", LINK, "--vehicle", "2", "--yes")
     assert (code, words) == (0, ["kill 2"])
     assert fleet.swarm.armed.tolist() == [True, False, True]
@@ -159,7 +69,7 @@ def test_take_back_hands_a_vehicle_to_the_flight_again(gcs):
     fleet = Fleet()
     fleet.released[2] = True
     fleet.swarm.custom_mode[2] = PX4_MODES["position"].custom_mode
-    with under_way(fleet) as words:
+    with flying(fleet) as words:
         code, _, err = gcs("take-back", "--link", LINK, "--vehicle", "3")
     assert (code, words) == (0, ["take back 3"])
     assert err.endswith("vehicle 3 flies with the others again\n")
@@ -171,7 +81,7 @@ def test_one_that_does_not_come_back_is_said_so(gcs, monkeypatch):
     fleet = Fleet()
     fleet.obey = str.strip
     fleet.released[2] = True
-    with under_way(fleet):
+    with flying(fleet):
         code, _, err = gcs("take-back", "--link", LINK, "--vehicle", "3")
     assert code == 3
     assert err.endswith("gcs: vehicle 3 did not come back to the flight\n")
@@ -189,7 +99,7 @@ REFUSED = [
 @pytest.mark.wall_clock
 @pytest.mark.parametrize(("words", "said"), REFUSED, ids=[words for words, _ in REFUSED])
 def test_what_a_flight_cannot_do_is_one_sentence_and_exit_code_2(gcs, words, said):
-    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as taken, under_way() as told:
+    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as taken, flying() as told:
         taken.bind(("0.0.0.0", 14999))
         code, out, err = gcs(*words.split(), "--link", LINK)
     assert (code, out, told) == (2, "", [])
@@ -208,15 +118,13 @@ def test_a_flight_that_hangs_is_named_with_its_process_and_what_to_do(gcs):
     assert f"`kill -9 {os.getpid()}`" in err
 
 
-def typed(*lines, link=LINK):
-    """`gcs kill` at a terminal where this is typed: exit code, what was said."""
+@pytest.fixture
+def keyboard(monkeypatch):
+    """A terminal's other end: what is written there has been typed."""
     keyboard, terminal = pty.openpty()
-    process = start(GCS, "kill", "--link", link, stdin=terminal)
-    os.write(keyboard, "".join(f"{line}\n" for line in lines).encode())
-    _, err = process.communicate(timeout=20)
-    os.close(keyboard)
-    os.close(terminal)
-    return process.returncode, err
+    with os.fdopen(keyboard, "wb", buffering=0) as typed, os.fdopen(terminal) as stdin:
+        monkeypatch.setattr("sys.stdin", stdin)
+        yield typed
 
 
 @pytest.mark.wall_clock
@@ -230,9 +138,10 @@ def typed(*lines, link=LINK):
     ],
     ids=["both", "too-few", "small-letters", "nothing"],
 )
-def test_on_a_terminal_kill_says_who_would_fall_from_where_and_asks_twice(lines, code, told):
-    with under_way() as words:
-        ended, err = typed(*lines)
+def test_on_a_terminal_kill_says_who_would_fall_from_where_and_asks_twice(gcs, keyboard, lines, code, told):
+    keyboard.write("".join(f"{line}\n" for line in lines).encode())
+    with flying() as words:
+        ended, _, err = gcs("kill", "--link", LINK)
     assert (ended, words) == (code, told)
     assert "vehicle 2: offboard, 9.8 m up" in err
     assert "Type KILL to go on" in err
@@ -249,145 +158,171 @@ def test_without_a_terminal_kill_needs_a_name_and_a_yes(options):
     assert done.stderr == "gcs: kill without a terminal needs --vehicle and --yes: whoever is in the air falls\n"
 
 
-# --- the socket
+# --- several links
 
 
-def test_the_socket_is_its_users_alone_and_goes_with_the_flight(runtime):
-    with ControlSocket(parse(LINK), (1,), say=str):
-        (folder,) = runtime.iterdir()
-        assert stat.S_IMODE(folder.stat().st_mode) == 0o700
-        (sock,) = folder.glob("*.sock")
-        assert stat.S_IMODE(sock.stat().st_mode) == 0o600
-        assert flying(parse(LINK)).process == os.getpid()
-    assert list(folder.iterdir()) == []
-    assert flying(parse(LINK)) is None
+OTHER = "udpin:0.0.0.0:14998"
 
 
-def test_a_directory_that_others_can_enter_is_not_used_and_the_flight_goes_on(runtime):
-    folder = runtime / f"trustr-{os.getuid()}"
-    folder.mkdir()
-    folder.chmod(0o777)
-    said = []
-    with ControlSocket(parse(LINK), (1,), said.append) as control:
-        assert control.take() == ()
-        assert flying(parse(LINK)) is None
-    assert len(said) == 1
-    assert "is not a directory of this user alone" in said[0]
-    assert list(folder.iterdir()) == []
-
-
-def test_what_a_dead_process_left_behind_is_thrown_away(runtime):
-    with ControlSocket(parse(LINK), (1,), say=str):
-        (card,) = runtime.glob("*/*.json")
-        process = subprocess.Popen(["true"])
-        process.wait()
-        left = card.with_name(f"{process.pid}.json")
-        left.write_bytes(orjson.dumps({"process": process.pid, "links": ["udpin:0.0.0.0:15000"]}))
-        assert flying(parse("udpin:0.0.0.0:15000")) is None
-        assert not left.exists()
-        assert flying(parse(LINK)) is not None
-
-
-@pytest.mark.parametrize("content", [b"", b"[]", b"{}", b'{"process": "x", "links": []}', b"\xff"])
-def test_a_card_that_makes_no_sense_is_nobodys(runtime, content):
-    with ControlSocket(parse(LINK), (1,), say=str):
-        (card,) = runtime.glob("*/*.json")
-        card.write_bytes(content)
-        assert flying(parse(LINK)) is None
-
-
-@pytest.mark.parametrize(
-    ("mine", "same"),
-    [
-        ("udpin:0.0.0.0:14550", True),
-        ("udpin:127.0.0.1:14550", True),
-        ("udp://:14550", True),
-        ("udpin:0.0.0.0:14549-14550", True),
-        ("udpin:0.0.0.0:14551", False),
-        ("tcpin:0.0.0.0:14550", False),
-        ("udpout:127.0.0.1:14550", False),
-        ("serial:/dev/ttyUSB0:57600", True),
-        ("/dev/ttyUSB0", True),
-        ("serial:/dev/ttyUSB1:57600", False),
-    ],
-)
-def test_a_flight_is_found_by_any_of_its_links_however_they_are_written(mine, same):
-    links = [*parse("udpin:0.0.0.0:14550"), *parse("serial:/dev/ttyUSB0:57600")]
-    with ControlSocket(links, (1,), say=str):
-        assert (flying(parse(mine)) is not None) == same
-
-
-def test_two_addresses_of_one_port_are_two_links():
-    with ControlSocket([Connection("udpin", "127.0.0.1", 14550)], (1,), say=str):
-        assert flying(parse("udpin:127.0.0.2:14550")) is None
+@pytest.fixture
+def quick(monkeypatch):
+    """Whoever is not heard at once is not there."""
+    monkeypatch.setattr(interventions, "HEAR_S", 0.2)
+    monkeypatch.setattr(interventions, "SILENT_S", 0.3)
 
 
 @pytest.mark.wall_clock
-@pytest.mark.parametrize("word", ["fly", "kill", "kill 0", "kill 4", "take back 9", "land now", 7, None, ["land"]])
-def test_a_word_that_is_none_is_refused_with_what_is_allowed(word):
-    with (
-        under_way() as words,
-        Call(flying(parse(LINK))) as call,
-        pytest.raises(Refused, match=r"allowed|must|not one of"),
-    ):
-        call.ask(word)
-    assert words == []
+@pytest.mark.parametrize("word", ["land", "hold"])
+def test_of_several_flights_each_is_told(gcs, word):
+    with flying() as words, flying(link=OTHER) as others:
+        code, _, err = gcs(word, "--link", LINK, "--link", OTHER)
+    assert (code, words, others) == (0, [word], [word])
+    assert err.count(f"{word}: done\n") == 2
 
 
-def test_the_flight_never_waits_for_who_talks_to_it():
-    with ControlSocket(parse(LINK), (1,), say=str) as control, Call(flying(parse(LINK))) as call:
-        call._socket.sendall(b'{"word": "la')
-        began = time.process_time()
-        assert all(control.take() == () for _ in range(1000))
-        assert time.process_time() - began < 0.5
+@pytest.mark.wall_clock
+def test_a_flight_that_hangs_keeps_no_other_from_being_told_and_the_exit_code_is_the_worst(gcs):
+    with ControlSocket(parse(LINK), (1,), say=str), flying(link=OTHER) as words:
+        code, _, err = gcs("land", "--link", LINK, "--link", OTHER)
+    assert (code, words) == (3, ["land"])
+    assert f"has {LINK} and did not answer within 1 s" in err
+    assert err.endswith("land: done\n")
 
 
-# --- whole processes
+@pytest.mark.wall_clock
+def test_a_flight_that_refuses_keeps_no_other_from_being_told(gcs):
+    landing = Fleet()
+    landing.phase = Phase.LAND
+    with flying(landing) as deaf, flying(link=OTHER) as words:
+        code, _, err = gcs("hold", "--link", LINK, "--link", OTHER)
+    assert (code, deaf, words) == (2, [], ["hold"])
+    assert "gcs: the flight is landing, and goes on landing: hold comes too late\n" in err
+
+
+@pytest.mark.wall_clock
+@pytest.mark.usefixtures("quick")
+def test_links_that_no_flight_has_are_stepped_in_on_besides(gcs):
+    with flying() as words, closing(Vehicle()) as vehicle:
+        code, _, err = gcs("land", "--link", LINK, "--link", vehicle.link)
+    assert (code, words) == (0, ["land"])
+    assert "land: done by 9\n" in err
+    assert err.endswith("land: done\n")
+
+
+@pytest.mark.wall_clock
+@pytest.mark.parametrize("command", ["kill --vehicle 1 --yes", "take-back --vehicle 1"])
+def test_what_is_for_one_flight_alone_is_refused_where_links_are_not_all_its_own(gcs, command):
+    with flying() as words:
+        code, _, err = gcs(*command.split(), "--link", LINK, "--link", OTHER)
+    assert (code, words) == (2, [])
+    assert f"not all of them are one flight's (process {os.getpid()}): {command.split()[0]} one at a time" in err
+
+
+# --- where a flight has gone, or somebody else is
+
+
+class Vehicle(threading.Thread):
+    """Vehicle 9, on the ground, in front of a port that we call: it answers whoever speaks to it with a heartbeat."""
+
+    def __init__(self):
+        super().__init__(daemon=True)
+        self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._udp.bind(("127.0.0.1", 0))
+        self.link = f"udpout:127.0.0.1:{self._udp.getsockname()[1]}"
+        self._over = threading.Event()
+        self.start()
+
+    def run(self):
+        sender = Sender(9, 1)
+        self._udp.settimeout(0.05)
+        while not self._over.is_set():
+            with suppress(TimeoutError):
+                _, station = self._udp.recvfrom(2048)
+                self._udp.sendto(sender.pack(dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3)), station)
+
+    def close(self):
+        self._over.set()
+        self.join()
+        self._udp.close()
+
+
+@pytest.mark.wall_clock
+@pytest.mark.usefixtures("quick")
+def test_where_the_flight_ends_before_all_is_done_its_vehicles_are_landed_without_it(gcs):
+    fleet = Fleet()
+    fleet.obey = str.strip
+    with closing(Vehicle()) as vehicle, flying(fleet, link=vehicle.link, ends_after=5):
+        code, _, err = gcs("land", "--link", vehicle.link)
+    assert code == 0
+    assert "the flight has ended before that; going on without it\n" in err
+    assert err.endswith("land: done by 9\n")
 
 
 @contextmanager
-def served(port, *options, speed=8):
-    server = start(FDM, "serve", "demo", "--to", f"udpout:{HOST}:{port}", "--speed", speed, *options)
-    try:
-        yield
-    finally:
-        server.send_signal(signal.SIGINT)
-        server.communicate(timeout=20)
-
-
-def free_port():
-    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as probe:
-        probe.bind((HOST, 0))
-        return probe.getsockname()[1]
-
-
-def in_mission(port, out, *options):
-    """`gcs fly` in a mission without end."""
-    words = ["--link", f"udpin:{HOST}:{port}", "--speed", "8", "--arm", "--yes", "--json", "--out", out]
-    process = start(
-        GCS, "fly", "demo", "--set", "mission.leg.1.length_m=200", *options, *words, stdin=subprocess.DEVNULL
-    )
-    for line in process.stderr:
-        if "mission" in line:
-            return process
-    raise AssertionError("it never began")
+def held(port, *, seconds):
+    """Somebody has this port, for so long."""
+    with closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as taken:
+        taken.bind(("127.0.0.1", port))
+        timer = threading.Timer(seconds, taken.close)
+        timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
+            timer.join()
 
 
 @pytest.mark.wall_clock
-def test_gcs_land_lands_a_flight_under_way_and_gcs_land_again_lands_what_a_killed_one_left(gcs, tmp_path):
-    port = free_port()
-    link = f"udpin:0.0.0.0:{port}"
-    with served(port, "--set", "swarm.rows=1", "--set", "swarm.columns=2", "--set", "swarm.leaders=[1]"):
-        fleet = ("--set", "swarm.rows=1", "--set", "swarm.columns=2", "--set", "swarm.leaders=[1]")
-        process = in_mission(port, tmp_path / "one", *fleet)
-        code, _, err = gcs("land", "--link", link)
-        assert code == 0, err
-        out, _ = process.communicate(timeout=30)
-        assert process.returncode == 0
-        assert orjson.loads(out)["problem"] is None
-        process = in_mission(port, tmp_path / "two", *fleet)
-        process.kill()
-        process.communicate(timeout=20)
-        code, _, err = gcs("land", "--link", link)
-        assert code == 0, err
-        assert "land: done by 1, 2\n" in err
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize("word", ["land", "hold"])
+def test_a_port_that_is_given_back_soon_is_waited_for(gcs, word):
+    with held(14997, seconds=0.5):
+        code, _, err = gcs(word, "--link", "udpin:127.0.0.1:14997")
+    assert code == 3
+    assert "udpin:127.0.0.1:14997: Address already in use; trying again for 10 s\n" in err
+    assert err.endswith("gcs: nobody is heard\n")
+
+
+@pytest.mark.wall_clock
+def test_one_that_is_not_is_refused_with_what_to_do(gcs, monkeypatch):
+    monkeypatch.setattr(links, "GIVEN_BACK_S", 0.2)
+    with held(14997, seconds=60.0):
+        code, _, err = gcs("land", "--link", "udpin:127.0.0.1:14997")
+    assert code == 2
+    assert err.endswith("gcs: udpin:127.0.0.1:14997: Address already in use; end what listens there\n")
+
+
+@pytest.mark.wall_clock
+def test_a_device_that_is_not_there_is_not_waited_for(gcs):
+    began = time.monotonic()
+    code, _, err = gcs("land", "--link", "serial:/dev/nothing")
+    assert (code, time.monotonic() - began < 5.0) == (2, True)
+    assert "trying again" not in err
+
+
+def empty(memory):
+    memory.write_bytes(b"")
+
+
+def another_kind(memory):
+    memory.mkdir()
+
+
+@pytest.mark.wall_clock
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize("spoilt", [empty, another_kind])
+def test_a_spoilt_memory_of_signing_keeps_nobody_from_landing(gcs, tmp_path, spoilt):
+    (tmp_path / "key").write_text("swordfish")
+    spoilt(tmp_path / "key.steps-in")
+    with closing(Vehicle()) as vehicle:
+        code, _, err = gcs("land", "--link", vehicle.link, "--signing-key", tmp_path / "key")
+    assert code == 3  # the vehicle does not sign
+    assert "going on without it, by this computer's clock\n" in err
+    assert "gcs: nobody is heard (frames refused: " in err
+
+
+def test_a_spoilt_memory_keeps_everybody_from_taking_off(tmp_path):
+    (tmp_path / "key").write_text("swordfish")
+    empty(tmp_path / "key.flies")
+    with pytest.raises(SigningKeyError), links.opened([], (1,), purpose=links.FLIES, signing_key=tmp_path / "key"):
+        pass
