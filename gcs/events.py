@@ -8,7 +8,7 @@ from dataclasses import dataclass
 LAND = "land"
 """End the flight."""
 HOLD = "hold"
-"""End the mission, and stay where you are until somebody says land."""
+"""End the mission, and stay where you are until somebody says land, or time.timeout_s has passed once more."""
 
 _TAKE_BACK = re.compile(r"take back (\d+)")
 _KILL = re.compile(r"kill (\d+)")

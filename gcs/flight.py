@@ -14,14 +14,16 @@ import numpy as np
 import numpy.typing as npt
 
 from gcs import leaving, losses, mission, preflight
+from gcs.asking import Asking, some
 from gcs.autopilots import Fleet
 from gcs.beliefs import Beliefs, Seen
-from gcs.commands import Beat, Command, Kill
+from gcs.commands import Beat, Command
 from gcs.control import settings
 from gcs.events import Event, Rating
 from gcs.flight_state import Asked, Commands, Diagnosis, FlightState, Phase, Step, abandoned, entered, failed
 from gcs.gate import LOST_NS
 from gcs.hands import Hands
+from gcs.rates import OUR_BEAT_S
 from gcs.rules import RuleError
 from gcs.steering import Steering
 from gcs.swarm_frame import swarm_frame
@@ -34,12 +36,13 @@ from trustr.roles import taken_back
 
 Array = npt.NDArray[np.float64]
 
-STALE_NS = 300_000_000
-"""Age of telemetry from which a vehicle has weight 0."""
-RETRY_S = 1.0
-"""Between two askings for the same thing."""
-JOIN_S = 60.0
-"""All vehicles must be heard and ready by then."""
+STALE_NS, UNSURE_NS = 300_000_000, 3_000_000_000
+"""Age of telemetry, and of a heartbeat, from which a vehicle has weight 0."""
+PATIENCE_S = 60.0
+"""All vehicles must be heard and ready by then; so long a climb may take beside a second for each metre, and so long
+taking control."""
+LANDING_S, GIVEN_UP_NS = 90.0, 30_000_000_000
+"""All vehicles must have landed by then; who is silent for longer is not waited for."""
 STREAM_FIRST_S = 1.0
 """Set-points flow this long before we ask for OFFBOARD."""
 STILL, LEVEL = 0.15, 0.2
@@ -71,6 +74,7 @@ class Flight:
         take_off_ne = -self._run_up_m(self._run_up_ticks) * self._ahead
         self._steering = Steering(scenario, self.plan, self._fleet, centre_ne=take_off_ne)
         self._watch = Watch(scenario, self._fleet, centre_ne=take_off_ne)
+        self._ask = Asking(scenario)
         self._phases: dict[Phase, Callable[[FlightState, Swarm, int], Step]] = {
             Phase.JOIN: self._join,
             Phase.CLIMB: self._climb,
@@ -104,10 +108,12 @@ class Flight:
         state = self._watch(state, swarm, now_ns)
         said = (*self._due(state), *(event for event in events if isinstance(event, Rating)))
         state = self._believe(state, swarm, said, now_ns)
-        state, kills = self._kill(state, swarm)
+        state, kills = self._ask.kill(state, swarm)
         state, commands, diagnosis = self._phases[state.phase](state, swarm, now_ns)
+        if state.tick % self.scenario.time.ticks(OUR_BEAT_S) == 0:
+            commands = commands + [(system, Beat()) for system in self.ids]
         if state.tick % self.scenario.time.ticks(1.0) == 0:
-            commands = commands + [(system, Beat()) for system in self.ids] + self._listen(state, swarm, now_ns)
+            commands = commands + self._listen(state, swarm, now_ns)
         state = replace(state, tick=state.tick + 1, now_ns=now_ns)
         return state, kills + commands, replace(diagnosis, ratings=said)
 
@@ -128,7 +134,7 @@ class Flight:
             position_ne=state.position_ne(swarm),
             velocity_ne=swarm.velocity_ned[:, :2],
             position_ns=swarm.position_ns,
-            heard=self._obeying(state, swarm) & swarm.fresh(now_ns, within_ns=STALE_NS),
+            heard=self._obeying(state, swarm) & _sure(swarm, now_ns),
             left=state.memory.roles.left if state.memory else np.zeros(len(swarm.ids), bool),
             ratings=said,
         )
@@ -143,7 +149,7 @@ class Flight:
 
     def _obeying(self, state: FlightState, swarm: Swarm) -> Flags:
         """(N,) who flies our set-points, and nobody else's."""
-        return np.asarray(self._fleet.obeying(swarm) & ~state.released)
+        return np.asarray(self._fleet.obeying(swarm) & ~state.released & ~state.hands.mute)
 
     def lacking(self, swarm: Swarm, now_ns: int) -> tuple[str, ...]:
         """Whom a flight still waits for before it takes off, and for what; empty where it may."""
@@ -155,10 +161,11 @@ class Flight:
         lacking = self.lacking(swarm, now_ns)
         if not lacking:
             return self._cleared(state, swarm, now_ns)
-        if (state.tick - state.phase_tick) * self._period_s > JOIN_S:
-            problem = f"not every vehicle was ready to arm within {JOIN_S:g} s, for lack of: {'; '.join(lacking)}"
+        if self._phase_s(state) > PATIENCE_S:
+            problem = f"not every vehicle was ready to arm within {PATIENCE_S:g} s, for lack of: {'; '.join(lacking)}"
             return self._land(failed(state, problem, Phase.DONE), swarm, now_ns)
-        return self._ask(state, swarm, lambda row: self._fleet.next_to_know(swarm, row, now_ns))
+        state, ask = self._ask(state, swarm, lambda row: self._fleet.next_to_know(swarm, row, now_ns))
+        return state, ask, self._overview(state, swarm)
 
     def _cleared(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
         """Everything is known: nobody is armed if anything speaks against it."""
@@ -171,19 +178,29 @@ class Flight:
         return self._climb(replace(entered(state, Phase.CLIMB), frame=frame, shift_ne=shift), swarm, now_ns)
 
     def _climb(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
-        if self._fleet.hovering(swarm).all():
+        hovering = self._fleet.hovering(swarm)
+        if hovering.all():
             return self._take_control(entered(state, Phase.TAKE_CONTROL), swarm, now_ns)
-        return self._ask(state, swarm, lambda row: _some(self._fleet.next_to_fly(swarm, row)))
+        patience_s = PATIENCE_S + self.scenario.swarm.altitude_m
+        if self._phase_s(state) > patience_s:
+            told = ((~swarm.armed, "are not armed"), (swarm.armed & ~hovering, "do not hover at their height"))
+            return self._land(self._in_vain(state, swarm, told, patience_s), swarm, now_ns)
+        state, ask = self._ask(state, swarm, lambda row: some(self._fleet.next_to_fly(swarm, row)))
+        return state, ask, self._overview(state, swarm)
 
     def _take_control(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
-        streaming_s = (state.tick - state.phase_tick) * self._period_s
+        streaming_s = self._phase_s(state)
         height_error = np.abs(swarm.position_ned[:, 2] + self.scenario.swarm.altitude_m)
         hovering = (np.linalg.norm(swarm.velocity_ned, axis=1) < STILL) & (height_error < LEVEL)
-        if streaming_s > STREAM_FIRST_S and self._fleet.obeying(swarm).all() and hovering.all():
+        obeying = self._fleet.obeying(swarm)
+        if streaming_s > STREAM_FIRST_S and obeying.all() and hovering.all():
             return self._run_up(entered(state, Phase.RUN_UP), swarm, now_ns)
+        if streaming_s > PATIENCE_S:
+            told = ((~obeying, "do not fly our set-points"), (obeying & ~hovering, "do not hover at their height"))
+            return self._land(self._in_vain(state, swarm, told, PATIENCE_S), swarm, now_ns)
         ask: Commands = []
         if streaming_s >= STREAM_FIRST_S:
-            state, ask, _ = self._ask(state, swarm, lambda row: _some(self._fleet.next_to_obey(swarm, row)))
+            state, ask = self._ask(state, swarm, lambda row: some(self._fleet.next_to_obey(swarm, row)))
         asked = self._steering.at_height(swarm, np.zeros((len(swarm.ids), 2)))
         state, commands, diagnosis = self._steering.send(state, swarm, now_ns, asked, self._overview(state, swarm))
         return state, ask + commands, diagnosis
@@ -208,7 +225,7 @@ class Flight:
             return self._land(entered(state, Phase.LAND), swarm, now_ns)
         flying = self._obeying(state, swarm) & ~losses.down(swarm, self.scenario.swarm.altitude_m)
         diagnosis = self._overview(state, swarm)
-        heard = flying & swarm.fresh(now_ns, within_ns=STALE_NS)
+        heard = flying & _sure(swarm, now_ns)
         beside = losses.beside_ne(
             swarm, diagnosis.position_ne, heard, now_ns, altitude_m=self.scenario.swarm.altitude_m
         )
@@ -219,7 +236,7 @@ class Flight:
         try:
             memory, decision = decide(state.memory, observation, diagnosis.virtual, self._settings)
         except RuleError as error:  # a researcher's own; who flies it is in the air
-            return self._land(failed(abandoned(state), str(error), Phase.LAND), swarm, now_ns)
+            return self._land(failed(abandoned(state, Phase.LAND), str(error), Phase.LAND), swarm, now_ns)
         state = self._note_the_lost(replace(state, memory=memory), swarm, flying, now_ns)
         return self._fly(state, swarm, now_ns, decision, diagnosis, flying)
 
@@ -235,7 +252,7 @@ class Flight:
         """Steer the swarm, those who leave it or come back to it out of its way, and those whom others give back."""
         roles, coming = decision.roles, state.hands.coming
         descends = roles.gone & (self.scenario.trust.beyond_repair == "land")
-        state, commands, _ = self._ask(state, swarm, lambda row: self._next_in_mission(swarm, row, descends, coming))
+        state, commands = self._ask(state, swarm, lambda row: self._next_in_mission(swarm, row, descends, coming))
         leaves = self.scenario.trust.beyond_repair != "keep"
         lower = leaving.lowered(roles, swarm, diagnosis.position_ne) if leaves else 0.0
         asked = self._steering.at_height(swarm, decision.velocity_ne, lower=lower)
@@ -248,36 +265,46 @@ class Flight:
     def _next_in_mission(self, swarm: Swarm, row: int, descends: Flags, coming: Flags) -> tuple[Command, ...]:
         """What one vehicle is asked for beside set-points."""
         if descends[row]:
-            return _some(self._fleet.next_to_land(swarm, row))
-        return _some(self._fleet.next_to_obey(swarm, row)) if coming[row] else ()
+            return some(self._fleet.next_to_land(swarm, row))
+        return some(self._fleet.next_to_obey(swarm, row)) if coming[row] else ()
 
     def _hold(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
-        """Stay in the air; who comes down by itself is not stopped, and the flight is over when all have."""
+        """Stay in the air; who comes down by itself is not stopped, and the flight is over when all have.
+
+        Who was taken back while it came down was meant to stay.
+        """
         if self._told(state) and not (swarm.armed & ~state.released).any():
             return self._land(entered(state, Phase.DONE), swarm, now_ns)
-        landing = self._fleet.landing(swarm)
-        state, commands, diagnosis = self._ask(
-            state, swarm, lambda row: () if landing[row] else _some(self._fleet.next_to_hold(swarm, row))
+        landing = self._fleet.landing(swarm) & ~state.hands.coming
+        state, commands = self._ask(
+            state, swarm, lambda row: () if landing[row] else some(self._fleet.next_to_hold(swarm, row))
         )
         still, obeying = np.zeros((len(swarm.ids), 3)), self._obeying(state, swarm)
-        state, steering, diagnosis = self._steering.send(state, swarm, now_ns, still, diagnosis, among=obeying)
+        overview = self._overview(state, swarm)
+        state, steering, diagnosis = self._steering.send(state, swarm, now_ns, still, overview, among=obeying)
         return state, commands + steering, diagnosis
 
     def _land(self, state: FlightState, swarm: Swarm, now_ns: int) -> Step:
-        heard = swarm.fresh(now_ns, within_ns=LOST_NS)
-        awaited = swarm.armed & (~state.released | state.hands.killing)
-        if self._told(state) and not (awaited & heard).any() and state.phase is not Phase.DONE:
-            problem = losses.fell_silent(swarm, awaited, state.phase) if awaited.any() else None
-            state = replace(entered(state, Phase.DONE), problem=state.problem or problem)
-        return self._ask(
-            state,
-            swarm,
-            lambda row: _some(self._fleet.next_to_land(swarm, row)) if state.phase is Phase.LAND else (),
-        )
+        """Ask until all are down. Where all were taken from us, those in modes of ours may be in nobody's hands."""
+        if state.phase is Phase.DONE:
+            return state, [], self._overview(state, swarm)
+        ours = ~state.released | state.hands.killing
+        up = swarm.armed & (ours if ours.any() else self._fleet.ours(swarm))
+        awaited = up & swarm.fresh(now_ns, within_ns=GIVEN_UP_NS)
+        if self._told(state) and (not awaited.any() or self._phase_s(state) > LANDING_S):
+            silent = ~swarm.fresh(now_ns, within_ns=LOST_NS)
+            problems = (state.problem, losses.not_down(swarm, up, silent, within_s=LANDING_S))
+            state = replace(entered(state, Phase.DONE), problem="; ".join(filter(None, problems)) or None)
+            return state, [], self._overview(state, swarm)
+        state, ask = self._ask(state, swarm, lambda row: some(self._fleet.next_to_land(swarm, row)))
+        return state, ask, self._overview(state, swarm)
 
     def _told(self, state: FlightState) -> bool:
         """Heartbeats have had the time to show what this phase asked for."""
-        return (state.tick - state.phase_tick) * self._period_s >= TOLD_S
+        return self._phase_s(state) >= TOLD_S
+
+    def _phase_s(self, state: FlightState) -> float:
+        return (state.tick - state.phase_tick) * self._period_s
 
     def _listen(self, state: FlightState, swarm: Swarm, now_ns: int) -> Commands:
         """Ask vehicles in the air again for positions that come too seldom: that request may have been lost."""
@@ -286,27 +313,12 @@ class Flight:
         asked = ((row, self._fleet.next_to_hear(swarm, row, now_ns)) for row in range(len(swarm.ids)))
         return [(swarm.ids[row], again) for row, again in asked if again is not None and not state.released[row]]
 
-    def _kill(self, state: FlightState, swarm: Swarm) -> tuple[FlightState, Commands]:
-        """Stop the rotors of those whom the operator said it of, again and again until they are seen to stand."""
-        killing = state.hands.killing
-        if not killing.any():
-            return state, []
-        again = (state.tick - state.hands.killed_tick) % self.scenario.time.ticks(RETRY_S) == 0
-        commands: Commands = [(swarm.ids[row], Kill()) for row in np.flatnonzero(killing & again)]
-        return replace(state, hands=replace(state.hands, killing=killing & swarm.armed)), commands
-
-    def _ask(self, state: FlightState, swarm: Swarm, what: Callable[[int], tuple[Command, ...]]) -> Step:
-        """Ask every vehicle of ours for what it still lacks; for the same, or less of it, only after RETRY_S."""
-        commands: Commands = []
-        asked = list(state.asked)
-        patience = self.scenario.time.ticks(RETRY_S)
-        for row, system in enumerate(swarm.ids):
-            wanted = () if state.released[row] else what(row)
-            repeated = set(wanted) <= set(asked[row].commands) and state.tick - asked[row].tick < patience
-            if wanted and not repeated:
-                asked[row] = Asked(wanted, state.tick)
-                commands += [(system, command) for command in wanted]
-        return replace(state, asked=tuple(asked)), commands, self._overview(state, swarm)
+    def _in_vain(
+        self, state: FlightState, swarm: Swarm, told: Iterable[tuple[Flags, str]], patience_s: float
+    ) -> FlightState:
+        """On to landing, with (N,) who is the cause of it, and how."""
+        who = "; ".join(f"{losses.named(swarm, rows)}: {how}" for rows, how in told if rows.any())
+        return failed(state, f"{state.phase.value} took longer than {patience_s:g} s: {who}", Phase.LAND)
 
     def _note_the_lost(self, state: FlightState, swarm: Swarm, flying: Flags, now_ns: int) -> FlightState:
         """The first vehicle to be lost is why the flight is incomplete; those that were left behind are not missed."""
@@ -317,7 +329,8 @@ class Flight:
         if not missed.any():
             return state
         row = int(np.argmax(missed))
-        how = losses.how(swarm, row, silent=bool(silent[row]), altitude_m=self.scenario.swarm.altitude_m)
+        mute, altitude_m = bool(state.hands.mute[row]), self.scenario.swarm.altitude_m
+        how = losses.how(swarm, row, silent=bool(silent[row]), mute=mute, altitude_m=altitude_m)
         when = f"{self._mission_s(state):.1f} s into the mission"
         return replace(state, problem=f"vehicle {swarm.ids[row]} {how} {when}")
 
@@ -357,5 +370,7 @@ def _by_tick(scenario: Scenario, ratings: Iterable[Rating]) -> dict[int, tuple[R
     return due
 
 
-def _some(command: Command | None) -> tuple[Command, ...]:
-    return () if command is None else (command,)
+def _sure(swarm: Swarm, now_ns: int) -> Flags:
+    """(N,) of whom we know well enough where they are, and in what mode."""
+    beats = now_ns - swarm.heartbeat_ns <= UNSURE_NS
+    return np.asarray(beats & swarm.fresh(now_ns, within_ns=STALE_NS))

@@ -39,6 +39,7 @@ class Phase(Enum):
 
 BEFORE_MISSION = (Phase.CLIMB, Phase.TAKE_CONTROL, Phase.RUN_UP)
 """In the air already: without one of them the mission cannot begin, so all come down."""
+IN_THE_AIR = (*BEFORE_MISSION, Phase.MISSION, Phase.HOLD)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +73,8 @@ class FlightState:
     """When the first tick was decided, from which the others' deadlines follow; None before it."""
     now_ns: int | None = None
     """When the last tick was decided."""
+    apart_ns: int | None = None
+    """When we last sent nobody anything, or heard nobody, for so long that vehicles may do without us."""
     frame: SwarmFrame | None = None
     """None until every vehicle has told where it is."""
     shift_ne: Array | None = None
@@ -91,6 +94,11 @@ class FlightState:
     def released(self) -> Flags:
         """(N,) vehicles that a pilot, or their autopilot, took from us."""
         return self.hands.released
+
+    @property
+    def over(self) -> Phase:
+        """The phase in which a flight that cannot go on ends: whoever is armed on the ground is not ours to land."""
+        return Phase.DONE if self.phase is Phase.JOIN else Phase.LAND
 
     def lateness_ns(self, now_ns: int, period_ns: int) -> int:
         """How far this tick is behind its deadline, reckoned from the first."""
@@ -139,7 +147,7 @@ def entered(state: FlightState, phase: Phase) -> FlightState:
     return replace(state, phase=phase, phase_tick=state.tick, asked=(Asked(),) * len(state.asked))
 
 
-def abandoned(state: FlightState, phase: Phase = Phase.LAND) -> FlightState:
+def abandoned(state: FlightState, phase: Phase) -> FlightState:
     """Land, or hold, before the mission is over: its clock stops, so that nobody scores what comes after."""
     return replace(entered(state, phase), mission_tick=None)
 

@@ -36,16 +36,27 @@ def beside_ne(swarm: Swarm, position_ne: Array, heard: Flags, now_ns: int, *, al
     return np.where(astray[:, None], position_ne + swarm.velocity_ned[:, :2] * on_s, np.nan)
 
 
-def how(swarm: Swarm, row: int, *, silent: bool, altitude_m: float) -> str:
+def how(swarm: Swarm, row: int, *, silent: bool, mute: bool, altitude_m: float) -> str:
     """What became of a vehicle that no longer flies with us."""
-    if silent:
-        return "fell silent"
+    if silent or mute:
+        return "fell silent" if silent else "does not tell its mode any more"
     return "came down" if down(swarm, altitude_m)[row] else "left the ground station's control"
 
 
 def fell_silent(swarm: Swarm, silent: Flags, phase: Phase) -> str:
-    """The sentence for vehicles (N,) that are not heard any more."""
-    return f"{vehicles([swarm.ids[row] for row in np.flatnonzero(silent)])} fell silent while {phase.value}"
+    """The sentence for vehicles (N,) that are not heard any more, or whose mode is not."""
+    return f"{named(swarm, silent)} fell silent while {phase.value}"
+
+
+def not_down(swarm: Swarm, up: Flags, silent: Flags, *, within_s: float) -> str:
+    """The sentence for vehicles (N,) that were not seen to land, some of which are not heard any more."""
+    told = ((up & silent, "fell silent before landing"), (up & ~silent, f"did not land within {within_s:g} s"))
+    return "; ".join(f"{named(swarm, who)} {how}" for who, how in told if who.any())
+
+
+def named(swarm: Swarm, who: Flags) -> str:
+    """These vehicles (N,) in words."""
+    return vehicles([swarm.ids[row] for row in np.flatnonzero(who)])
 
 
 def vehicles(systems: Sequence[int]) -> str:

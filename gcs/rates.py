@@ -25,8 +25,8 @@ BITS_A_BYTE = 10
 """8N1: a start bit, eight, a stop bit."""
 RESERVE = 0.1
 """Of the link, for commands, their answers, words, and what is sent again."""
-BEAT_S = 1.0
-"""Between two heartbeats, theirs and ours."""
+BEAT_S, OUR_BEAT_S = 1.0, 0.5
+"""Between two heartbeats of a vehicle, and two of ours."""
 USUAL_SPEEDS = (57_600, 115_200, 230_400, 460_800, 921_600, 1_500_000, 3_000_000)
 """Bits a second that radios and autopilots can be set to."""
 LONGEST_PERIOD_S = 0.4
@@ -75,7 +75,7 @@ def positions_per_tick(connections: Iterable[Connection], scenario: Scenario, *,
 
 
 def _load(*, signed: bool) -> _Load:
-    beats = 2 * _frame(messages.HEARTBEAT, signed=signed) / BEAT_S
+    beats = _frame(messages.HEARTBEAT, signed=signed) * (1 / BEAT_S + 1 / OUR_BEAT_S)
     slow = sum(_frame(message, signed=signed) / interval_s for message, interval_s in SLOW_S)
     return _Load(
         setpoint=_frame(SET_POSITION_TARGET_LOCAL_NED, signed=signed),

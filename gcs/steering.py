@@ -55,7 +55,7 @@ class Steering:
     ) -> Step:
         """Send what passes the gate, (N, 3) m/s, to those of `among`, everybody, whom we may send it."""
         hands = state.hands
-        ours = ~hands.released & (self._fleet.ours(swarm) | hands.coming)
+        ours = ~hands.released & ~hands.mute & (self._fleet.ours(swarm) | hands.coming)
         standing = Standing(
             ids=swarm.ids,
             ours=ours if among is None else ours & among,

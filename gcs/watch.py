@@ -10,7 +10,7 @@ import numpy.typing as npt
 from gcs import hands, losses
 from gcs.autopilots import Fleet
 from gcs.events import HOLD, LAND, Event, killed, taken_back
-from gcs.flight_state import BEFORE_MISSION, FlightState, Phase, abandoned, failed
+from gcs.flight_state import BEFORE_MISSION, IN_THE_AIR, FlightState, Phase, abandoned, failed
 from gcs.gate import LOST_NS, Limits
 from gcs.hands import Duty
 from gcs.telemetry import Integers, Swarm
@@ -18,12 +18,14 @@ from scenarios import Scenario
 
 Array = npt.NDArray[np.float64]
 
-LANDING_S = 90.0
-"""All vehicles must have landed by then."""
 STOOD_NS = 2_000_000_000
 """A loop that did not turn for so long does not go on by itself: by now, its vehicles do what they do without it."""
+APART_NS, EXCUSED_NS = 300_000_000, 3_000_000_000
+"""Who hears nothing of us for so long may do without us, and its next heartbeats show it; no pilot did that."""
 BREACH_M = 2.0
 """Outside its fence by more than this, a vehicle is not merely blown, or badly measured."""
+
+TOLD_TO_HOLD = "the swarm was told to hold, and who lands by itself is not stopped"
 
 DUTIES = {
     Phase.CLIMB: Duty.TAKE_OFF,
@@ -33,7 +35,6 @@ DUTIES = {
     Phase.HOLD: Duty.HOLD,
     Phase.LAND: Duty.LAND,
 }
-IN_THE_AIR = (*BEFORE_MISSION, Phase.MISSION, Phase.HOLD)
 
 
 class Watch:
@@ -55,15 +56,16 @@ class Watch:
             elif back in swarm.ids:
                 state = self._taken_back(state, swarm, swarm.ids.index(back), now_ns)
         if LAND in events and state.phase not in (Phase.LAND, Phase.DONE):
-            return abandoned(state)
+            return abandoned(state, state.over)
         if HOLD in events and state.phase not in (Phase.HOLD, Phase.LAND, Phase.DONE):
-            return abandoned(state, Phase.HOLD)
+            return abandoned(state, Phase.DONE if state.phase is Phase.JOIN else Phase.HOLD)
         return state
 
     def __call__(self, state: FlightState, swarm: Swarm, now_ns: int) -> FlightState:
         """The flight as it goes on, if it does."""
         state = self._stood(state, now_ns)
-        state = self._hands(state, swarm)
+        state = self._apart(state, swarm, now_ns)
+        state = self._hands(state, swarm, now_ns)
         state = self._time(state)
         state = self._silence(state, swarm, now_ns)
         return self._fence(state, swarm, now_ns)
@@ -84,24 +86,38 @@ class Watch:
 
     def _gone_on_without(self, state: FlightState, problem: str) -> FlightState:
         """Before the mission nobody can be spared; in it, somebody must be left."""
-        if state.phase in BEFORE_MISSION:
-            return failed(state, problem, Phase.LAND)
+        if state.phase is Phase.JOIN or state.phase in BEFORE_MISSION:
+            return failed(state, problem, state.over)
         if state.phase is Phase.MISSION and state.released.all():
-            return failed(abandoned(state), problem, Phase.LAND)
+            problem = f"{state.problem or problem}; none is left to us: gcs land lands whom nobody flies"
+            return replace(abandoned(state, Phase.LAND), problem=problem)
         return replace(state, problem=state.problem or problem)
 
     def _stood(self, state: FlightState, now_ns: int) -> FlightState:
         stood_ns = 0 if state.now_ns is None else now_ns - state.now_ns
         if stood_ns <= STOOD_NS or state.phase not in IN_THE_AIR:
             return state
-        problem = f"the ground station stood still for {stood_ns / 1e9:.1f} s {self._when(state)}: the swarm holds"
-        return failed(abandoned(state), problem, Phase.HOLD)
+        problem = f"the ground station stood still for {stood_ns / 1e9:.1f} s {self._when(state)}: {TOLD_TO_HOLD}"
+        return failed(abandoned(state, Phase.HOLD), problem, Phase.HOLD)
 
-    def _hands(self, state: FlightState, swarm: Swarm) -> FlightState:
+    def _apart(self, state: FlightState, swarm: Swarm, now_ns: int) -> FlightState:
+        """Where we and the vehicles were apart, and some show that they do without us, all hold: none is a pilot's."""
+        unsent_ns = 0 if state.now_ns is None else now_ns - state.now_ns - self._scenario.time.period_ns
+        unheard_ns = min(now_ns - swarm.position_ns[~state.released], default=0)
+        if max(unsent_ns, unheard_ns) > APART_NS:
+            state = replace(state, apart_ns=now_ns)
+        if state.apart_ns is None or now_ns - state.apart_ns > EXCUSED_NS:
+            return state
+        back = hands.fallen_back(state.hands, swarm, self._duty(state), self._fleet)
+        if not back.any():
+            return state
+        problem = f"{losses.named(swarm, back)} did without us, who were cut off, {self._when(state)}: {TOLD_TO_HOLD}"
+        return failed(abandoned(state, Phase.HOLD), problem, Phase.HOLD)
+
+    def _hands(self, state: FlightState, swarm: Swarm, now_ns: int) -> FlightState:
         """Let go of whom others took."""
-        after, taken = hands.watched(
-            state.hands, swarm, self._duty(state), self._fleet, height_m=self._scenario.swarm.altitude_m
-        )
+        height_m = self._scenario.swarm.altitude_m
+        after, taken = hands.watched(state.hands, swarm, now_ns, self._duty(state), self._fleet, height_m=height_m)
         when = self._when(state)
         state = replace(state, hands=after)
         if not taken:
@@ -117,19 +133,17 @@ class Watch:
         return duty
 
     def _time(self, state: FlightState) -> FlightState:
-        """Give up what takes too long."""
-        time = self._scenario.time
-        if state.phase is Phase.LAND:
-            if (state.tick - state.phase_tick) * time.period_s > LANDING_S:
-                return failed(state, f"not every vehicle landed within {LANDING_S:g} s", Phase.DONE)
-        elif state.tick * time.period_s > time.timeout_s and state.phase is not Phase.DONE:
-            problem = f"the flight took longer than time.timeout_s = {time.timeout_s:g} s"
-            return failed(abandoned(state), problem, Phase.LAND)
-        return state
+        """Give up what takes too long; who was told to hold is given as long again."""
+        time, holds = self._scenario.time, state.phase is Phase.HOLD
+        took_s = (state.tick - (state.phase_tick if holds else 0)) * time.period_s
+        if took_s <= time.timeout_s or state.phase in (Phase.LAND, Phase.DONE):
+            return state
+        problem = f"{'holding' if holds else 'the flight'} took longer than time.timeout_s = {time.timeout_s:g} s"
+        return failed(abandoned(state, state.over), problem, state.over)
 
     def _silence(self, state: FlightState, swarm: Swarm, now_ns: int) -> FlightState:
         """A fleet that loses a vehicle before its mission lands."""
-        silent = ~swarm.fresh(now_ns, within_ns=LOST_NS)
+        silent = ~swarm.fresh(now_ns, within_ns=LOST_NS) | state.hands.mute
         if state.phase not in BEFORE_MISSION or not silent.any():
             return state
         return failed(state, losses.fell_silent(swarm, silent, state.phase), Phase.LAND)
@@ -144,7 +158,7 @@ class Watch:
             return state
         row = int(np.argmax(out_m))
         problem = f"vehicle {swarm.ids[row]} was {out_m[row]:.1f} m outside the fence {self._when(state)}: all land"
-        return failed(abandoned(state), problem, Phase.LAND)
+        return failed(abandoned(state, Phase.LAND), problem, Phase.LAND)
 
     def _outside_m(self, state: FlightState, swarm: Swarm) -> Array:
         """(N,) m beyond the fence's wall or its ceiling; not above 0 inside, and where nothing is known."""

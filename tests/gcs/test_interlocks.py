@@ -8,10 +8,11 @@ import pytest
 from obedient import EVERYBODY, MODE, PERIOD_S, PROTECTED, START, Fleet, Log
 
 from gcs import losses
+from gcs.asking import RETRY_S
 from gcs.autopilots import Fleet as Autopilots
 from gcs.commands import Arm, ChangeMode, Kill, Land, SetVelocity, TakeOff
 from gcs.events import HOLD, LAND, kill, take_back
-from gcs.flight import RETRY_S, TOLD_S
+from gcs.flight import TOLD_S
 from gcs.flight_state import Phase
 from gcs.gate import FENCED, LATE_PERIODS, REFUSED, WITHHELD
 from gcs.hands import RETURNS_S, killed
@@ -365,7 +366,7 @@ def test_a_loop_that_stood_still_for_two_seconds_holds_and_does_not_go_on_by_its
     log = Log(Fleet(), late={tick: STOOD_NS / 1e9 + 0.5}, events=said((tick + 80, LAND)))
     assert {d.phase for d in log.diagnoses[tick : tick + 80]} == {Phase.HOLD}
     assert "the ground station stood still for 2." in log.end.problem
-    assert "the swarm holds" in log.end.problem
+    assert "the swarm was told to hold" in log.end.problem
     assert log.end.done
 
 
