@@ -11,8 +11,8 @@ are then brought straight to zero at BRAKING, comes to rest at
 p and v where it is and how fast, u what it is sent, û its direction. A set-point is admitted if that place is inside
 for both ends of τ, and so is p + τ v. If it was inside a tick ago, then braking now keeps it inside, so there is always
 a set-point to admit, and the way to that place is inside as well: it lies between p, p + τ v and where it ends, and a
-cylinder is convex. A vehicle that is blown outwards may have no such set-point: it is braked as hard as the limits
-allow, and one that is outside already may fly where it goes no farther out.
+cylinder is convex. A vehicle that drifts outwards, or is blown, may have no such set-point: it is braked as hard as the
+limits allow, or flies what ends no farther out than braking does. To one that is outside, its own place is the bound.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ from scenarios import Scenario
 from trustr.leader import capped
 
 Array = npt.NDArray[np.float64]
-Inside = Callable[[Array], Flags]
+Beyond = Callable[[Array], Array]
+"""(N, k) m → (N,) m: how far places lie outside the fence; not above 0 inside."""
 
 PASSED, SLOWED, REFUSED, FENCED, WITHHELD = range(5)
 """Verdicts: as asked; limited in speed or acceleration; no number, or decided too late, so the vehicle is asked to
@@ -100,8 +101,8 @@ class Standing:
     velocity_ned: Array
     """(N, 3) m/s."""
     before_ned: Array
-    """(N, 3) m/s: the set-points of the last tick, as they were sent; NaN where none was, whoever flew meanwhile: then the
-    next goes on from what the vehicle flies."""
+    """(N, 3) m/s: the set-points of the last tick, as they were sent; NaN where none was, for whatever reason: the next
+    goes on from what the vehicle flies."""
     lateness_ns: int
     """Of the tick, after its deadline."""
 
@@ -205,19 +206,19 @@ def _fenced(free: Array, before: Array, standing: Standing, limits: Limits, *, d
     highest = np.minimum(HAIR - limits.ceiling, place[:, 2])
     lowest = np.maximum(-limits.floor - HAIR, place[:, 2])
 
-    def level(points: Array) -> Flags:
-        return np.asarray(np.hypot(points[:, 0], points[:, 1]) <= radius)
+    def level(points: Array) -> Array:
+        return np.asarray(np.hypot(points[:, 0], points[:, 1]) - radius)
 
-    def height(points: Array) -> Flags:
-        return np.asarray((points[:, 0] >= highest) & (points[:, 0] <= lowest))
+    def height(points: Array) -> Array:
+        return np.maximum(highest - points[:, 0], points[:, 0] - lowest)
 
     flown = free.copy()
-    parts: tuple[tuple[slice, Inside, float], ...] = (
+    parts: tuple[tuple[slice, Beyond, float], ...] = (
         (slice(0, 2), level, BRAKING[0]),
         (slice(2, 3), height, BRAKING[1]),
     )
-    for part, inside, braking in parts:
-        stop = _Stop(place[:, part], velocity[:, part], inside, min(braking, limits.acceleration), dt)
+    for part, beyond, braking in parts:
+        stop = _Stop(place[:, part], velocity[:, part], beyond, min(braking, limits.acceleration), dt)
         flown[:, part] = stop.nearest(free[:, part], braked[:, part])
     return np.where(rows[:, None], flown, free)
 
@@ -230,26 +231,42 @@ class _Stop:
     """(N, k) m, by now."""
     velocity: Array
     """(N, k) m/s."""
-    inside: Inside
+    beyond: Beyond
     braking: float
     """m/s²."""
     dt: float
+    """s."""
 
     def nearest(self, wanted: Array, braked: Array) -> Array:
-        """The set-points (N, k) next to those wanted from which vehicles stop inside; braking where there is none."""
-        good = self.stops_inside(wanted)
+        """The set-points (N, k) next to those wanted that may be flown; braking where there is none."""
+        most = self._most_beyond(braked)
+        good = self._stops(wanted, most)
         if good.all():
             return wanted
         less, more = np.zeros(len(wanted)), np.ones(len(wanted))
         for _ in range(HALVINGS):
             middle = 0.5 * (less + more)
-            inside = self.stops_inside(braked + middle[:, None] * (wanted - braked))
+            inside = self._stops(braked + middle[:, None] * (wanted - braked), most)
             less, more = np.where(inside, middle, less), np.where(inside, more, middle)
         return np.where(good[:, None], wanted, braked + less[:, None] * (wanted - braked))
 
-    def stops_inside(self, set_points: Array) -> Flags:
-        """(N,) for the slowest answer to these set-points, and for one without any lag."""
+    def _stops(self, set_points: Array, most_beyond: Array) -> Flags:
+        """(N,) who stops inside without any lag, and with the slowest answer no farther out than this [m]."""
+        run = self._run(set_points)
+        prompt, slow = self.beyond(self.place + run), self.beyond(self._coast + run)
+        return np.asarray((prompt <= 0.0) & (slow <= most_beyond))
+
+    def _most_beyond(self, braked: Array) -> Array:
+        """(N,) m outside where the slowest answer may end: none, but where braking ends there, or drifts out first."""
+        ends = self.beyond(self._coast + self._run(braked))
+        return np.where(self.beyond(self._coast) <= 0.0, np.maximum(ends, 0.0), ends)
+
+    @property
+    def _coast(self) -> Array:
+        """(N, k) m: where the slowest answer drifts to, whatever it is sent."""
+        return np.asarray(self.place + RESPONSE_S * self.velocity)
+
+    def _run(self, set_points: Array) -> Array:
+        """(N, k) m: the way from there until it stands."""
         speed = np.sqrt((set_points * set_points).sum(axis=1))[:, None]
-        run = set_points * (0.5 * speed / self.braking + self.dt)
-        coast = self.place + RESPONSE_S * self.velocity
-        return self.inside(self.place + run) & self.inside(coast) & self.inside(coast + run)
+        return np.asarray(set_points * (0.5 * speed / self.braking + self.dt))

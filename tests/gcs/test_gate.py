@@ -258,6 +258,47 @@ def test_a_vehicle_outside_may_come_back_and_go_no_farther(asked_ned, sent):
     assert verdict == (PASSED if sent == asked_ned else FENCED)
 
 
+OUTWARDS = {"on the level": (np.array([1.0, 0, 0]), FENCE.radius), "in height": (np.array([0, 0, -1.0]), FENCE.ceiling)}
+
+
+@pytest.mark.parametrize("out_m", [0.0, 0.5])
+@pytest.mark.parametrize("drift_m_s", [0.01, 0.3, 1.0])
+@pytest.mark.parametrize("way", OUTWARDS)
+def test_a_vehicle_that_drifts_out_at_its_bound_comes_back_when_asked(way, drift_m_s, out_m):
+    outwards, bound = OUTWARDS[way]
+    place = np.where(outwards != 0, (bound + out_m) * outwards, MIDDLE)
+    news = {"place_ned": place[None], "velocity_ned": drift_m_s * outwards[None]}
+    for back_m_s in (0.5, 0.01):
+        assert one(-back_m_s * outwards, limits=FENCE, **news)[0] == pytest.approx(-back_m_s * outwards)
+    assert one(0.5 * outwards, limits=FENCE, **news)[0] == pytest.approx(np.zeros(3), abs=1e-3)
+
+
+def test_nor_does_it_cross_its_fence_to_be_as_far_out_on_the_other_side():
+    news = {"place_ned": np.array([[0.5, 0, -8]]), "velocity_ned": np.array([[3.0, 0, 0]])}
+    small = replace(FENCE, radius=2.0, acceleration=100.0)
+    sent, _ = one((-5, 0, 0), limits=small, **news)
+    assert sent[0] < 0
+    assert stopping(0.5, 0.0, sent[:1], lag_s=0.0, braking=BRAKING[0]) >= -small.radius
+
+
+@pytest.mark.parametrize("part", [0, 2])
+@pytest.mark.parametrize("speed", [0.1, 0.3, 0.6])
+def test_rounding_takes_nobody_over_the_wall(part, speed):
+    """A set-point from which a vehicle would stop on the very wall is a little faster when it has become single."""
+    assert single(speed) > speed
+    outwards = np.where(np.arange(3) == part, -1.0 if part == 2 else 1.0, 0.0)
+    bound, braking = (FENCE.ceiling, BRAKING[1]) if part == 2 else (FENCE.radius, BRAKING[0])
+
+    def way(at_m_s):
+        return at_m_s * (0.5 * at_m_s / braking + DT)
+
+    place = np.where(outwards != 0, (bound - way(speed)) * outwards, MIDDLE)
+    fleet = standing(np.zeros((1, 3)), place_ned=place[None])
+    (sent,) = decoded(admitted(speed * outwards[None], fleet, FENCE)).values()
+    assert 0.9 * speed < sent @ outwards
+    assert place @ outwards + way(sent @ outwards) <= bound
+
+
 @pytest.mark.parametrize("name", ["place_ned", "velocity_ned"])
 def test_inside_a_fence_nobody_moves_who_does_not_know_where_he_is(name):
     unknown = standing(**{name: np.where(np.arange(N)[:, None] == 2, nan, np.tile(MIDDLE, (N, 1)) * 0)})
