@@ -7,11 +7,14 @@ be poisoned by anybody. Page: https://mavlink.io/en/guide/message_signing.html
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import hmac
 import json
+import os
 import re
 import time
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 
@@ -26,6 +29,8 @@ BEHIND_AT_MOST = 60 * TICKS_PER_S
 """A stream that was never heard before may be this much older than the newest time known, and no more."""
 MARGIN = 2 * TICKS_PER_S
 """What is written down is this much ahead, so that it holds for a while and need not be written for every frame."""
+AHEAD_AT_MOST = 365 * 86_400 * TICKS_PER_S
+"""A memory may know times so far ahead of the wall clock: a clock that was never set is further behind."""
 STREAMS_AT_MOST = 1024
 """Streams that are told apart; only who holds the key can open one."""
 
@@ -67,9 +72,11 @@ class Signer:
     """Signs what leaves and judges what comes, for all streams of one program.
 
     key:     32 bytes
-    memory:  a file of this program alone that keeps the newest timestamps, own and others', over a restart, even where
-             it was killed or its clock set back in between (after a kill, frames of the next 2 s are refused);
-             without one a frame can be played again after a restart, within a minute
+    memory:  a file of this program alone (a lock beside it sees to that) that keeps the newest timestamps, own and
+             others', over a restart, even where it was killed or its clock set back in between (after a kill, frames
+             of the next 2 s are refused); without one a frame can be played again after a restart, within a minute.
+             On the disk it is only from a start and an orderly end: where the machine lost power, what was said since
+             the start can be played again
     link:    link id of what leaves, 0 to 255: two programs that sign as the same component must differ in it
     wall:    seconds since 1970
     """
@@ -83,6 +90,7 @@ class Signer:
         self._link = link
         self._wall = wall
         self._memory = memory
+        self._unlock = None if memory is None else weakref.finalize(self, os.close, _locked(memory))
         self._recalled = {} if memory is None else _recalled(memory)
         self._newest: dict[Stream, int] = dict(self._recalled)
         self._last = max(self._newest.values(), default=0)
@@ -91,7 +99,12 @@ class Signer:
         self.trouble: str | None = None
         """Why the memory could not be written last time, in one sentence."""
         if memory is not None:
-            self._remember(memory, margin=0)
+            if self._last > self._now() + AHEAD_AT_MOST:
+                raise SigningKeyError(
+                    f"signing memory {memory}: is more than a year ahead of this machine's clock; set the clock, or "
+                    "delete the memory a minute after the last flight"
+                )
+            self._remember(memory, margin=0, lasting=True)
             if self.trouble is not None:
                 raise SigningKeyError(self.trouble)
 
@@ -131,9 +144,11 @@ class Signer:
         return None
 
     def save(self) -> None:
-        """Write down what is known now, to the tick: for an orderly end."""
-        if self._memory is not None:
-            self._remember(self._memory, margin=0)
+        """Write down what is known now, to the tick, and leave the memory to the next program: an orderly end."""
+        if self._memory is not None and self._unlock is not None:
+            self._remember(self._memory, margin=0, lasting=True)
+            self._memory = None
+            self._unlock()
 
     def __repr__(self) -> str:
         return f"Signer(link={self._link}, {len(self._newest)} streams)"
@@ -151,15 +166,22 @@ class Signer:
         if self._memory is not None and timestamp > self._written.get(stream, -1):
             self._remember(self._memory, margin=MARGIN)
 
-    def _remember(self, memory: Path, *, margin: int) -> None:
-        """Write the memory; where that fails, flying comes first: it is tried again when what it holds runs out."""
+    def _remember(self, memory: Path, *, margin: int, lasting: bool = False) -> None:
+        """Write the memory; where that fails, flying comes first: it is tried again when what it holds runs out.
+
+        lasting: wait until the disk has it, which takes too long for a tick
+        """
         self._written = {
             stream: newest if newest == self._recalled.get(stream) else min(newest + margin, LAST_TICK)
             for stream, newest in self._newest.items()
         }
         draft = memory.with_name(memory.name + ".new")
         try:
-            draft.write_text(json.dumps([[*stream, timestamp] for stream, timestamp in self._written.items()]))
+            with draft.open("w") as file:
+                json.dump([[*stream, timestamp] for stream, timestamp in self._written.items()], file)
+                if lasting:
+                    file.flush()
+                    os.fsync(file.fileno())
             draft.replace(memory)
         except OSError as error:
             self.trouble = f"signing memory {memory}: cannot be written: {error.strerror or error}"
@@ -167,18 +189,38 @@ class Signer:
             self.trouble = None
 
 
+def _locked(memory: Path) -> int:
+    """A file beside the memory, open, and locked until it is closed, if only because the program ends.
+
+    The memory itself is another file each time that it is written. Raises SigningKeyError.
+    """
+    try:
+        file = os.open(memory.with_name(memory.name + ".lock"), os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC, 0o666)
+    except OSError as error:
+        raise SigningKeyError(f"signing memory {memory}: cannot be written: {error.strerror or error}") from None
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(file)
+        raise SigningKeyError(f"signing memory {memory}: is in use by another program") from None
+    return file
+
+
 def _recalled(memory: Path) -> dict[Stream, int]:
     """What a memory holds. Raises SigningKeyError."""
     try:
         lines = json.loads(memory.read_bytes())
-        entries = {(int(system), int(component), int(link)): int(newest) for system, component, link, newest in lines}
-        if not all(0 <= newest <= LAST_TICK for newest in entries.values()):
-            raise ValueError
+        entries = {(system, component, link): newest for system, component, link, newest in lines}
+        for stream, newest in entries.items():
+            if not all(type(number) is int for number in (*stream, newest)):
+                raise ValueError
+            if not (0 <= min(stream) <= max(stream) <= 255 and 0 <= newest <= LAST_TICK):
+                raise ValueError
     except FileNotFoundError:
         return {}
     except OSError as error:
         raise SigningKeyError(f"signing memory {memory}: cannot be read: {error.strerror or error}") from None
-    except (ValueError, TypeError, OverflowError):
+    except (ValueError, TypeError, RecursionError):
         raise SigningKeyError(
             f"signing memory {memory}: is damaged; a minute after the last flight it may be deleted, to begin a new one"
         ) from None

@@ -3,6 +3,9 @@
 import hashlib
 import itertools
 import random
+import shutil
+import subprocess
+import sys
 
 import pytest
 from hypothesis import given
@@ -289,6 +292,11 @@ def test_timestamps_follow_the_wall_clock(wall):
         assert timestamp(signer.sign(heartbeat(sender))) == wall.ticks
 
 
+def killed(signer):
+    """All that the system does for a program that ends: files are closed, and with them the lock."""
+    signer._unlock()
+
+
 @pytest.mark.parametrize("orderly", [True, False], ids=["saved", "killed"])
 @pytest.mark.parametrize("set_back_s", [0.0, 3600.0])
 def test_no_timestamp_repeats_after_a_restart(wall, tmp_path, orderly, set_back_s):
@@ -299,8 +307,7 @@ def test_no_timestamp_repeats_after_a_restart(wall, tmp_path, orderly, set_back_
             wall.now += 0.03
             before, used = used, timestamp(signer.sign(heartbeat(sender)))
             assert used > before
-        if orderly:
-            signer.save()
+        signer.save() if orderly else killed(signer)
         wall.now -= set_back_s
 
 
@@ -309,8 +316,7 @@ def test_what_was_heard_before_a_restart_cannot_be_played_after_it(wall, tmp_pat
     signer = Signer(KEY, memory=tmp_path / "memory", wall=wall)
     recorded = [frame for system in (1, 2) for frame in genuine(wall, 300, system=system)]
     assert admitted(signer, recorded) == 600
-    if orderly:
-        signer.save()
+    signer.save() if orderly else killed(signer)
     again = Signer(KEY, memory=tmp_path / "memory", wall=wall)
     assert admitted(again, recorded) == 0
     assert admitted(Signer(KEY, wall=wall), recorded) > 0, "without a memory they are"
@@ -351,13 +357,56 @@ def test_the_memory_is_written_about_once_a_second_however_much_is_said(wall, tm
     assert 5 <= len(written) <= 10
 
 
+def test_a_memory_is_one_programs_alone_until_it_ends(wall, tmp_path):
+    memory = tmp_path / "memory"
+    first = Signer(KEY, memory=memory, wall=wall)
+    first.sign(heartbeat(Sender(255, 190)))
+    with pytest.raises(SigningKeyError, match=rf"^signing memory {memory}: is in use by another program$"):
+        Signer(KEY, memory=memory, wall=wall)
+    other = Signer(KEY, memory=tmp_path / "other", wall=wall)
+    first.save()
+    second = Signer(KEY, memory=memory, wall=wall)
+    killed(second)
+    third = Signer(KEY, memory=memory, wall=wall)
+    assert (other.trouble, third.trouble) == (None, None)
+
+
+def test_a_program_that_is_killed_gives_its_memory_back(tmp_path):
+    code = (
+        "import sys; from pathlib import Path; from wire.signing import Signer; "
+        "signer = Signer(bytes(32), memory=Path(sys.argv[1])); print('ready', flush=True); sys.stdin.read()"
+    )
+    memory = tmp_path / "memory"
+    command = [sys.executable, "-c", code, str(memory)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as program:
+        assert program.stdout.readline() == b"ready\n"
+        with pytest.raises(SigningKeyError, match="is in use by another program"):
+            Signer(KEY, memory=memory)
+        program.kill()
+    Signer(KEY, memory=memory)
+
+
+def test_the_disk_is_waited_for_at_the_start_and_at_an_orderly_end_and_never_in_between(wall, tmp_path, monkeypatch):
+    synced = []
+    monkeypatch.setattr("wire.signing.os.fsync", synced.append)
+    signer = Signer(KEY, memory=tmp_path / "memory", wall=wall)
+    assert len(synced) == 1
+    written = set()
+    for _ in range(100):
+        wall.now += 0.1
+        signer.sign(heartbeat(Sender(255, 190)))
+        written.add((tmp_path / "memory").read_bytes())
+    assert (len(synced), len(written) > 3) == (1, True)
+    signer.save()
+    assert len(synced) == 2
+
+
 def test_a_disk_that_fills_up_in_flight_is_told_and_stops_nothing(wall, tmp_path):
     folder = tmp_path / "folder"
     folder.mkdir()
     signer, sender = Signer(KEY, memory=folder / "memory", wall=wall), Sender(255, 190)
     assert signer.trouble is None
-    (folder / "memory").unlink()
-    folder.rmdir()
+    shutil.rmtree(folder)
     signer.sign(heartbeat(sender))
     assert signer.trouble == f"signing memory {folder / 'memory'}: cannot be written: No such file or directory"
     folder.mkdir()
@@ -426,12 +475,27 @@ def test_nothing_that_is_shown_shows_the_key(wall, tmp_path):
 
 
 @pytest.mark.parametrize("content", ["", "[", "{}x", '[["a", 1, 0, 5]]', "[[1, 1, 0]]", "[[1, 1, 0, -1]]", "[5]", "7",
-                                     "[[1, 1, 0, 1e999]]", f"[[1, 1, 0, {2**48}]]"])  # fmt: skip
+                                     "[[1, 1, 0, 1e999]]", f"[[1, 1, 0, {2**48}]]", "[" * 100_000, "[[256, 1, 0, 5]]",
+                                     "[[1, -1, 0, 5]]", "[[1, 1, 0, true]]", "[[1, 1.5, 0, 5]]", '[["1", 1, 0, 5]]',
+                                     "[[[1], 1, 0, 5]]", "null"])  # fmt: skip
 def test_a_damaged_memory_is_refused_in_one_sentence(tmp_path, content):
     memory = tmp_path / "memory"
     memory.write_text(content)
     with pytest.raises(SigningKeyError, match=r"^signing memory .*: is damaged; [^\n]*$"):
         Signer(KEY, memory=memory)
+
+
+@pytest.mark.parametrize(("days", "believed"), [(364, True), (366, False), (36_500, False), (None, False)])
+def test_a_memory_that_is_far_ahead_of_the_clock_is_refused_in_one_sentence(wall, tmp_path, days, believed):
+    newest = LAST_TICK if days is None else min(wall.ticks + days * DAY_S * TICKS_PER_S, LAST_TICK)
+    memory = tmp_path / "memory"
+    memory.write_text(f"[[1, 1, 0, {newest}]]")
+    if believed:
+        Signer(KEY, memory=memory, wall=wall)
+    else:
+        with pytest.raises(SigningKeyError, match=r"^signing memory .*: is more than a year ahead of this machine's "):
+            Signer(KEY, memory=memory, wall=wall)
+    assert str(newest) in memory.read_text()
 
 
 def test_a_memory_that_cannot_be_kept_is_refused_before_the_flight(tmp_path):
