@@ -6,12 +6,15 @@ import math
 import re
 import signal
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
 if TYPE_CHECKING:
+    from fdm.server import Server
     from wire.connection import Connection
     from wire.signing import Signer
 
@@ -54,7 +57,9 @@ def serve(
     autopilot
         What the vehicles are taken for: its modes, messages, parameters and failsafes.
     stock_failsafes
-        With the autopilot's own failsafe parameters; ours stop after 0.5 s of silence and land.
+        With the autopilot's own failsafe parameters. With ours a vehicle stops 0.5 s after its last set-point. A px4
+        lands 5 s later; an ardupilot hovers on for as long as it hears heartbeats of its ground station (system 255),
+        and lands 5 s after the last. Neither misses a ground station that it never heard.
     signing_key
         A file with the key, 64 hex digits or a passphrase: what the vehicles say is signed, and they obey nothing
         that is not.
@@ -77,47 +82,69 @@ def serve(
         return _refuse(f"--speed {speed}: must be a number above 0")
     if seed < 0:
         return _refuse(f"--seed {seed}: must not be negative")
-    try:
-        loaded = load(scenario, overrides=set_)
-        connections = parse(to)
-        if len(connections) > 1:
-            return _refuse(f"--to {to}: one port; with --ports separate the others follow it")
-        trouble = _no_room(connections[0], ports, loaded.swarm.count)
-        if trouble:
-            return _refuse(f"--to {to}: {trouble}")
-        world = World(
-            loaded.without_faults() if no_fault else loaded,
-            seed=seed,
-            autopilot=autopilot,
-            stock_failsafes=stock_failsafes,
-        )
-        signer = _signer(signing_key, connections[0])
-        server = Server(world, connections[0], ports=ports, speed=speed, signer=signer)
-    except (ScenarioError, ConnectionRefused, SigningKeyError) as error:
-        return _refuse(str(error))
-    stopped = False
-
-    def stop(_signal: int, _frame: object) -> None:
-        nonlocal stopped
-        stopped = True
-
-    signal.signal(signal.SIGINT, stop)
-    signal.signal(signal.SIGTERM, stop)
-    _say(
-        f"{loaded.swarm.count} vehicles {_where(connections[0])} ({autopilot}, {ports} ports, speed {speed:g}); "
-        "Ctrl-C stops"
-    )
-    warned = False
-    while not stopped:
-        server.turn()
-        if server.behind_s > 1.0 and not warned:
-            warned = True
-            _say(f"this machine is too slow for --speed {speed:g}: the simulation lags {server.behind_s:.1f} s")
-    server.close()
-    if signer is not None:
-        signer.save()
+    with _told_to_stop() as stopped:
+        try:
+            loaded = load(scenario, overrides=set_)
+            connections = parse(to)
+            if len(connections) > 1:
+                return _refuse(f"--to {to}: one port; with --ports separate the others follow it")
+            trouble = _no_room(connections[0], ports, loaded.swarm.count)
+            if trouble:
+                return _refuse(f"--to {to}: {trouble}")
+            world = World(
+                loaded.without_faults() if no_fault else loaded,
+                seed=seed,
+                autopilot=autopilot,
+                stock_failsafes=stock_failsafes,
+            )
+            signer = _signer(signing_key, connections[0])
+            server = Server(world, connections[0], ports=ports, speed=speed, signer=signer)
+        except (ScenarioError, ConnectionRefused, SigningKeyError) as error:
+            return _refuse(str(error))
+        try:
+            _say(
+                f"{_who_does_what(loaded.swarm.count, connections[0])} ({autopilot}, {ports} ports, speed {speed:g}); "
+                "Ctrl-C stops"
+            )
+            _fly(server, signer, speed, stopped)
+        finally:
+            server.close()
+            if signer is not None:
+                signer.save()
+                _warn(None, signer.trouble)
     _say("stopped")
     return 0
+
+
+@contextmanager
+def _told_to_stop() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C or SIGTERM came since the block began: they are noted, and interrupt nothing."""
+    came: list[int] = []
+    before = {number: signal.signal(number, lambda *_: came.append(1)) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield lambda: bool(came)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _fly(server: Server, signer: Signer | None, speed: float, stopped: Callable[[], bool]) -> None:
+    """Until told to stop; what goes wrong meanwhile is said when it begins."""
+    slow, trouble = False, None
+    while not stopped():
+        server.turn()
+        if server.behind_s > 1.0 and not slow:
+            slow = True
+            _say(f"this machine is too slow for --speed {speed:g}: the simulation lags {server.behind_s:.1f} s")
+        if signer is not None:
+            trouble = _warn(trouble, signer.trouble)
+
+
+def _warn(before: str | None, now: str | None) -> str | None:
+    """Say what is wrong now, unless something was before."""
+    if now is not None and before is None:
+        _say(now)
+    return now
 
 
 def _no_room(to: Connection, ports: str, count: int) -> str:
@@ -140,9 +167,9 @@ def _signer(key: Path | None, to: Connection) -> Signer | None:
     return Signer(read_key(key), memory=key.with_name(f"{key.name}.vehicles-{place}"))
 
 
-def _where(to: Connection) -> str:
-    waits = to.kind in ("udpin", "tcpin")
-    return f"wait at {to}" if waits else f"send to {to}"
+def _who_does_what(count: int, to: Connection) -> str:
+    verb, place = ("wait", "at") if to.kind in ("udpin", "tcpin") else ("send", "to")
+    return f"1 vehicle {verb}s {place} {to}" if count == 1 else f"{count} vehicles {verb} {place} {to}"
 
 
 def _refuse(words: str) -> int:

@@ -11,6 +11,7 @@ import pytest
 from clients import REQUEST, VERSION, Station, command
 
 from fdm.cli import app
+from fdm.world import World
 from scenarios import load
 from wire.connection import ConnectionRefused
 from wire.frames import Framer, decode
@@ -94,6 +95,90 @@ def test_bad_input_is_refused_with_one_sentence_and_code_2(run, arguments, words
     assert len(said.splitlines()) == 1
     for word in words:
         assert word in said
+
+
+ONE = ("--set", "swarm.rows=1", "--set", "swarm.columns=1", "--set", "swarm.leaders=[1]", "--no-fault")
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_whoever_stops_it_while_it_builds_need_not_ask_twice(run, monkeypatch, stop):
+    def build(scenario, **options):
+        signal.raise_signal(stop)
+        return World(scenario, **options)
+
+    monkeypatch.setattr("fdm.world.World", build)
+    handlers = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    with listening() as (_, to):
+        code, out, said = run("serve", "demo", "--to", to, *ONE)
+    assert (code, out) == (0, "")
+    assert said.splitlines() == [f"1 vehicle sends to {to} (px4, shared ports, speed 1); Ctrl-C stops", "stopped"]
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == handlers
+
+
+class Turns:
+    """What happens in each turn of a server, one after the other."""
+
+    def __init__(self, *turns):
+        self.turns = list(turns)
+
+    def __call__(self):
+        self.turns.pop(0)()
+
+
+def test_however_it_ends_the_port_and_the_memory_of_signing_are_given_back(monkeypatch, tmp_path):
+    key = tmp_path / "key"
+    key.write_text("correct horse battery staple\n")
+    monkeypatch.setattr("fdm.server.Server.turn", Turns(lambda: None, lambda: 1 // 0))
+    with listening() as (udp, to):
+        address = udp.getsockname()
+    to = to.replace("udpout", "udpin")
+    with pytest.raises(ZeroDivisionError):
+        app(["serve", "demo", "--to", to, "--signing-key", str(key), *ONE])
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:
+        again.bind(address)
+    (memory,) = tmp_path.glob("key.vehicles-*[0-9]")
+    Signer(read_key(key), memory=memory)
+
+
+def test_a_memory_of_signing_that_cannot_be_written_is_said_when_it_begins_and_at_the_end(run, monkeypatch, tmp_path):
+    key = tmp_path / "key"
+    key.write_text("correct horse battery staple\n")
+    signers = []
+
+    class Full(Signer):
+        def __init__(self, *arguments, **options):
+            super().__init__(*arguments, **options)
+            signers.append(self)
+
+        def save(self):
+            super().save()
+            self.trouble = "signing memory: is full"
+
+    def turn(trouble):
+        def happens():
+            signers[0].trouble = trouble
+
+        return happens
+
+    monkeypatch.setattr("wire.signing.Signer", Full)
+    turns = map(turn, (None, "first", "first", None, "second", "second"))
+    monkeypatch.setattr("fdm.server.Server.turn", Turns(*turns, lambda: signal.raise_signal(signal.SIGTERM)))
+    with listening() as (_, to):
+        code, _, said = run("serve", "demo", "--to", to, "--signing-key", str(key), *ONE)
+    assert code == 0
+    assert said.splitlines()[1:] == ["first", "second", "signing memory: is full", "stopped"]
+
+
+def test_two_programs_do_not_share_a_memory_of_signing(run, tmp_path):
+    key = tmp_path / "key"
+    key.write_text("correct horse battery staple\n")
+    with listening() as (_, to):
+        place = to.replace(":", "-")
+        memory = Signer(read_key(key), memory=tmp_path / f"key.vehicles-{place}")
+        code, _, said = run("serve", "demo", "--to", to, "--signing-key", str(key), *ONE)
+        memory.save()
+    assert code == 2
+    assert said.endswith("is in use by another program\n")
 
 
 def test_a_port_in_use_is_refused_with_one_sentence_and_code_2(run):
@@ -189,4 +274,4 @@ def test_with_a_key_the_vehicles_sign_and_obey_nobody_without_it(tmp_path):
             process.send_signal(signal.SIGINT)
             process.wait(timeout=4.0)
     assert process.returncode == 0
-    assert len(list(tmp_path.glob("swarm.key.vehicles-*"))) == 1
+    assert len(list(tmp_path.glob("swarm.key.vehicles-*[0-9]"))) == 1
