@@ -57,6 +57,8 @@ CHUNK, MOST_CHUNKS = 50, 8
 """Bytes that one STATUSTEXT holds, and how many of them make the longest text that we wait for."""
 LOST = "…"
 """Stands where a piece of a text never came."""
+UNPRINTABLE = "�"
+"""Stands where something was no letter: the begin of a command to a terminal, or a new line."""
 
 
 class Piece(NamedTuple):
@@ -74,12 +76,16 @@ def joined(
 ) -> tuple[list[tuple[int, str]], Piece | None]:
     """The texts [(severity, text)] that are complete with this STATUSTEXT, and the one that has begun.
 
-    begun: what the same vehicle has begun;  text_id: 0 for a text in one piece;  chunk: counts from 0.
+    begun: what the same vehicle has begun;  text_id: 0 for a text in one piece;  chunk: counts from 0;
+    text: a letter a byte.
     A text is complete with the first chunk that is not full; https://mavlink.io/en/messages/common.html#STATUSTEXT
+    What cannot be printed is not handed on: a terminal would do what it says.
     """
+    full = len(text) >= CHUNK
+    text = "".join(letter if letter.isprintable() else UNPRINTABLE for letter in text)
     if text_id == 0:
         return [(severity, text)], begun
-    done, full = [], len(text.encode()) >= CHUNK
+    done = []
     if begun is not None and (begun.text_id, begun.chunks) == (text_id, chunk):
         text = begun.text + text
     else:

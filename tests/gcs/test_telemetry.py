@@ -423,6 +423,13 @@ def test_a_text_in_pieces_is_told_when_it_is_complete(length, split):
     assert done.pieces == (None, None, None)
 
 
+@pytest.mark.parametrize("text_id", [0, 3])
+def test_what_a_terminal_would_obey_is_not_handed_on(text_id):
+    text = b"a\x1b[2Jb\r\nc\x9bd\x07e" + 20 * b"\xff"
+    (words,) = observe(FLEET, [said(dialect.MAVLink_statustext_message(4, text, id=text_id))]).words
+    assert words == (2, 4, "a�[2Jb��c�d�e" + 20 * "�")
+
+
 def test_where_a_piece_was_lost_the_text_says_so():
     first, _, last = chunks("a" * 50 + "b" * 50 + "c")
     assert observe(FLEET, [first, last]).words == ((2, 4, "a" * 50 + "…"), (2, 4, "…c"))
