@@ -31,6 +31,11 @@ WARNING = 4
 """MAV_SEVERITY up to which a vehicle's words are shown."""
 MOST_ROWS = 24
 """Vehicles with a line of their own."""
+LEFT = ("UAV", "role", "mode")
+RIGHT = ("north", "east", "height", "speed", "battery", "link age", "trust")
+"""Columns, by where their cells stand."""
+LEAST_NEEDED = ("battery", "role", "speed", "east", "north")
+"""Columns that a narrow terminal goes without, the first first."""
 
 
 class Display:
@@ -97,36 +102,49 @@ class Display:
             head.append(f" · {diagnosis.task}")
         flown = 0.0 if math.isnan(diagnosis.mission_s) else diagnosis.mission_s
         bar = ProgressBar(total=self._flight.plan.read_out_s, completed=flown, width=72)
-        return Group(head, Padding(bar, (0, 0, 1, 0)), self._table(tick))
+        below = Text(
+            ""
+        )  # where a terminal shows ^C: behind a full line it would begin another, and leave this head behind
+        return Group(head, Padding(bar, (0, 0, 1, 0)), self._table(tick), below)
 
     def _table(self, tick: Tick) -> Table:
+        ids = tick.swarm.ids[:MOST_ROWS]
+        cells = zip(*(self._cells(tick, row) for row in range(len(ids))), strict=True)
+        columns = dict(zip((*LEFT, *RIGHT), cells, strict=True))
+        for heading in LEAST_NEEDED:
+            if sum(_width(*column) for column in columns.items()) > self._console.width:
+                del columns[heading]
         table = Table(box=None, padding=(0, 1), header_style="dim")
-        for column in ("UAV", "role", "mode"):
-            table.add_column(column)
-        for column in ("north", "east", "height", "speed", "battery", "link age", "trust"):
-            table.add_column(column, justify="right", no_wrap=True)
-        swarm, diagnosis = tick.swarm, tick.diagnosis
-        for row, system in enumerate(swarm.ids[:MOST_ROWS]):
-            north, east = diagnosis.position_ne[row]
-            age_s = (tick.time_ns - int(swarm.position_ns[row])) / 1e9
-            heard = swarm.position_ns[row] > 0
-            table.add_row(
-                str(system),
-                _part(system, self._parts, released=bool(tick.state.released[row])),
-                _mode(bool(swarm.armed[row]), int(swarm.autopilot[row]), int(swarm.custom_mode[row])),
-                _number(north, "m"),
-                _number(east, "m"),
-                _number(-swarm.position_ned[row, 2], "m"),
-                _number(math.hypot(*swarm.velocity_ned[row, :2]), "m/s"),
-                "–" if math.isnan(swarm.battery[row]) else f"{swarm.battery[row]:.0%}",
-                Text(f"{age_s:.2f} s", style="red" if age_s > 0.3 else "")
-                if heard
-                else Text("not heard", style="yellow"),
-                _trust_bar(float(diagnosis.trust[row])),
-            )
-        if len(swarm.ids) > MOST_ROWS:
-            table.caption = f"and {len(swarm.ids) - MOST_ROWS} more"
+        for heading in columns:
+            table.add_column(heading, justify="left" if heading in LEFT else "right", no_wrap=True)
+        for row in zip(*columns.values(), strict=True):
+            table.add_row(*row)
+        if len(tick.swarm.ids) > MOST_ROWS:
+            table.caption = f"and {len(tick.swarm.ids) - MOST_ROWS} more"
         return table
+
+    def _cells(self, tick: Tick, row: int) -> tuple[Text, ...]:
+        """One vehicle, column by column."""
+        swarm, diagnosis = tick.swarm, tick.diagnosis
+        system = swarm.ids[row]
+        north, east = diagnosis.position_ne[row]
+        return (
+            Text(str(system)),
+            _part(system, self._parts, released=bool(tick.state.released[row])),
+            _mode(bool(swarm.armed[row]), int(swarm.autopilot[row]), int(swarm.custom_mode[row])),
+            _number(north, "m"),
+            _number(east, "m"),
+            _number(-swarm.position_ned[row, 2], "m"),
+            _number(math.hypot(*swarm.velocity_ned[row, :2]), "m/s"),
+            Text("–" if math.isnan(swarm.battery[row]) else f"{swarm.battery[row]:.0%}"),
+            _age(tick.time_ns, int(swarm.position_ns[row])),
+            _trust_bar(float(diagnosis.trust[row])),
+        )
+
+
+def _width(heading: str, cells: tuple[Text, ...]) -> int:
+    """Of a column on the screen, with the space around it."""
+    return max(len(heading), *(cell.cell_len for cell in cells)) + 2
 
 
 def _part(system: int, parts: Parts, *, released: bool) -> Text:
@@ -176,8 +194,15 @@ def _mode(armed: bool, autopilot: int, custom_mode: int) -> Text:
     return Text(mode_name(autopilot, custom_mode)) if armed else Text("disarmed", style="dim")
 
 
-def _number(value: float, unit: str) -> str:
-    return "–" if math.isnan(value) else f"{value:.1f} {unit}"
+def _number(value: float, unit: str) -> Text:
+    return Text("–" if math.isnan(value) else f"{value:.1f} {unit}")
+
+
+def _age(now_ns: int, position_ns: int) -> Text:
+    if position_ns <= 0:
+        return Text("not heard", style="yellow")
+    age_s = (now_ns - position_ns) / 1e9
+    return Text(f"{age_s:.2f} s", style="red" if age_s > 0.3 else "")
 
 
 def _trust_bar(trust: float) -> Text:

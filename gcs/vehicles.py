@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -11,6 +12,7 @@ import orjson
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from gcs import messages
+from gcs.guard import DONE, NOT_DONE
 from gcs.links import refused
 from gcs.live import Live
 from gcs.roster import Roster
@@ -19,13 +21,12 @@ from wire.frames import Frame, decode
 from wire.ids import AUTOPILOT
 from wire.modes import ARDUPILOT, PX4, mode_name
 
-HEARD, NOTHING = 0, 3
-"""Exit codes."""
 STEP_NS = 100_000_000
 HEADS = (
     "id", "autopilot", "type", "mode", "armed", "height", "speed", "battery",
     "satellites", "accuracy", "from", "messages/s", "loss",
 )  # fmt: skip
+UNTOLD, GAP = "–", "  "
 NO_SATELLITES = 255
 """What GPS_RAW_INT says where it does not know."""
 
@@ -129,11 +130,7 @@ def list_heard(live: Live, *, seconds: float, as_json: bool, console: Any, write
             ear.take(live.receive())
     except KeyboardInterrupt:  # has heard enough
         ear.take(live.receive())
-    quality = live.quality
-    found = [
-        ear.vehicle(system, live.now(), link=live.address(system), loss=_loss(quality, system))
-        for system in sorted(ear.roster.swarms)
-    ]
+    found = [_found(ear, live, system) for system in sorted(ear.roster.swarms)]
     if as_json:
         told = {
             "vehicles": [asdict(vehicle) for vehicle in found],
@@ -144,11 +141,18 @@ def list_heard(live: Live, *, seconds: float, as_json: bool, console: Any, write
         write(orjson.dumps(told))
     else:
         _show(found, live, console)
-    return HEARD if found else NOTHING
+    return DONE if found else NOT_DONE
+
+
+def _found(ear: Ear, live: Live, system: int) -> Vehicle:
+    quality = live.quality.get(system)
+    loss = None if quality is None else quality.loss
+    return ear.vehicle(system, live.now(), link=live.address(system), loss=loss)
 
 
 def _show(found: list[Vehicle], live: Live, console: Any) -> None:
-    for line in _table([HEADS, *map(_cells, found)]) if found else ["nobody is heard"]:
+    room = console.width if console.is_terminal else math.inf
+    for line in table([HEADS, *map(_cells, found)], room) if found else ["nobody is heard"]:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
     lines = [
         *(f"two vehicles call themselves {system}: give each an id of its own" for system in sorted(live.duplicates)),
@@ -162,10 +166,25 @@ def _show(found: list[Vehicle], live: Live, console: Any) -> None:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
 
 
-def _table(rows: list[tuple[str, ...]]) -> list[str]:
-    """Columns as wide as their widest cell: nothing that names a vehicle is ever cut off."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+def table(rows: list[tuple[str, ...]], room: float) -> list[str]:
+    """Lines of columns as wide as their widest cell, without those that nobody told anything for.
+
+    room: letters that a line has; columns beyond it stand below, beside the first column again.
+    """
+    name, *others = (
+        [cell.ljust(max(map(len, column))) for cell in column]
+        for column in zip(*rows, strict=True)
+        if {*column[1:]} != {UNTOLD}
+    )
+    blocks, taken = [[name]], len(name[0])
+    for column in others:
+        width = len(GAP) + len(column[0])
+        if taken + width > room and len(blocks[-1]) > 1:
+            blocks.append([name])
+            taken = len(name[0])
+        blocks[-1].append(column)
+        taken += width
+    return [GAP.join(line).rstrip() for block in blocks for line in zip(*block, strict=True)]
 
 
 def _cells(vehicle: Vehicle) -> tuple[str, ...]:
@@ -174,27 +193,20 @@ def _cells(vehicle: Vehicle) -> tuple[str, ...]:
         vehicle.autopilot,
         vehicle.type,
         vehicle.mode,
-        "armed" if vehicle.armed else "–",
+        "armed" if vehicle.armed else "disarmed",
         _cell(vehicle.height_m, "{:.1f} m"),
         _cell(vehicle.speed_m_s, "{:.1f} m/s"),
         _cell(vehicle.battery, "{:.0%}"),
         _cell(vehicle.satellites, "{}"),
         _cell(vehicle.accuracy_m, "{:.1f} m"),
-        vehicle.link or "–",
+        vehicle.link or UNTOLD,
         f"{vehicle.messages_per_s:.1f}",
         _cell(vehicle.loss, "{:.1%}"),
     )
 
 
 def _cell(value: float | None, form: str) -> str:
-    return "–" if value is None else form.format(value)
-
-
-def _loss(quality: Any, system: int) -> float | None:
-    meter = quality.get(system)
-    if meter is None or meter.received + meter.lost == 0:
-        return None
-    return round(float(meter.lost / (meter.received + meter.lost)), 4)
+    return UNTOLD if value is None else form.format(value)
 
 
 def _named(enum: str, number: int) -> str:

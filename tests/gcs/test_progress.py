@@ -141,6 +141,29 @@ def test_the_whole_flight_can_be_shown_and_leaves_the_terminal_as_it_was(flight)
     assert screen.count("\x1b[?25l") == screen.count("\x1b[?25h")  # and the cursor is back
 
 
+@pytest.mark.parametrize(
+    ("width", "missing"),
+    [(110, set()), (84, {"battery"}), (72, {"battery", "role"}), (60, {"battery", "role", "speed"})],
+)
+def test_a_narrow_terminal_goes_without_the_least_needed_columns_and_cuts_no_word(flight, width, missing):
+    decided, turns = flight
+    middle = next(turn for turn in turns if turn.diagnosis.mission_s >= 15.0)
+    picture = last_picture(shown(decided, [middle], force_terminal=True, width=width, color_system=None))
+    (head,) = (line for line in picture.splitlines() if "UAV" in line)
+    columns = {"role", "mode", "height", "speed", "battery", "link age", "trust"}
+    assert {column for column in columns if column not in head} == missing
+    assert picture.count("offboard") == 6
+    assert "…" not in picture
+
+
+def test_below_the_picture_there_is_a_line_for_what_the_terminal_itself_writes(flight):
+    decided, turns = flight
+    screen = Console(file=StringIO(), force_terminal=True, width=80)
+    with Display(decided, screen, title="emergency") as display:
+        display.tick(turns[0])
+        assert screen.file.getvalue().endswith("\n")
+
+
 def test_a_narrow_terminal_is_no_reason_to_fail(flight):
     decided, turns = flight
     assert "emergency" in shown(decided, turns[-1:], force_terminal=True, width=30)

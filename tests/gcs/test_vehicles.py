@@ -1,5 +1,6 @@
 """`gcs vehicles`, and the listening before anybody is armed: who is there, told without sending anything."""
 
+import math
 import signal
 import socket
 import subprocess
@@ -11,7 +12,7 @@ import pytest
 from flights import GCS, start
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from gcs.vehicles import Ear
+from gcs.vehicles import Ear, table
 from wire.frames import Framer, Sender
 from wire.modes import ARDUPILOT, PX4, PX4_MODES
 from wire.signing import Signer, read_key
@@ -84,6 +85,27 @@ def test_what_a_receiver_does_not_know_is_unknown():
 
 def test_messages_a_second_count_from_when_it_was_first_heard():
     assert vehicle(*((5.0 + tick / 10, beat()) for tick in range(50)), now_s=10.0).messages_per_s == 10.0
+
+
+ROWS = [("id", "mode", "armed", "battery"), ("1", "altitude hold", "armed", "–"), ("10", "hold", "disarmed", "–")]
+
+
+def test_a_column_that_nobody_told_anything_for_is_left_out():
+    assert table(ROWS, math.inf) == [
+        "id  mode           armed",
+        "1   altitude hold  armed",
+        "10  hold           disarmed",
+    ]
+
+
+def test_what_a_line_has_no_room_for_stands_below_and_no_word_is_broken():
+    assert table(ROWS, 25) == [
+        "id  mode", "1   altitude hold", "10  hold",
+        "id  armed", "1   armed", "10  disarmed",
+    ]  # fmt: skip
+    assert table(ROWS, 27) == table(ROWS, math.inf)
+    assert max(map(len, table(ROWS, 27))) == 27
+    assert table(ROWS, 3) == table(ROWS, 25)
 
 
 def test_a_companion_computer_and_the_truth_of_a_simulated_vehicle_are_no_vehicle():
