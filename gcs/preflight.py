@@ -4,9 +4,11 @@ Above all: whoever stops hearing from us must come down or go home by itself. Th
 back from each vehicle, because both autopilots are delivered with some of it switched off.
 
 PX4 (1.14 and later) leaves OFFBOARD after COM_OF_LOSS_T without set-points and then does COM_OBL_RC_ACT: 0 position,
-1 altitude, 2 stabilized (a pilot's modes), 3 return, 4 land, 5 hold, 6 terminate, 7 disarm. NAV_DLL_ACT follows after
+1 altitude, 2 stabilized, 3 return, 4 land, 5 hold, 6 terminate, 7 disarm. The first three are a pilot's: with sticks on
+the air PX4 flies them, without it returns (failsafe.cpp), and we cannot know which. NAV_DLL_ACT follows after
 COM_DL_LOSS_T without a ground station's heartbeat: 0 nothing, 1 hold, 2 return, 3 land, 5 terminate, 6 disarm.
 https://docs.px4.io/main/en/config/safety.html
+https://github.com/PX4/PX4-Autopilot/blob/main/src/modules/commander/failsafe/failsafe.cpp
 
 ArduCopter stops after GUID_TIMEOUT without set-points and stays in GUIDED; FS_GCS_ENABLE follows after FS_GCS_TIMEOUT
 without a heartbeat of SYSID_MYGCS: 0 nothing, 1 return, 2 (gone since 4.0) mission, 3 SmartRTL or return, 4 SmartRTL
@@ -41,9 +43,9 @@ PX4_SETPOINTS_S, GUIDED_S = 1.0, 3.0
 
 _ON_SETPOINTS_LOST = MappingProxyType(
     {
-        0: "position mode",
-        1: "altitude mode",
-        2: "stabilized mode",
+        0: "position mode, or return without sticks,",
+        1: "altitude mode, or return without sticks,",
+        2: "stabilized mode, or return without sticks,",
         3: "return",
         4: "land",
         5: "hold",
@@ -94,6 +96,7 @@ def _px4(told: Told) -> Iterator[str]:
             f"COM_OF_LOSS_T = {silence:g} (seconds for which set-points may be missing); "
             f"must be above 0 and at most {PX4_SETPOINTS_S:g}"
         )
+    # With sticks, whether anybody holds them or not, position mode stays where it is; the other two drift, or fall.
     comes_down = after_setpoints in (3, 4)
     link_brings_down = after_setpoints in (0, 5) and after_link in (2, 3) and 0.0 < link_s <= SILENCE_S
     if not comes_down and not link_brings_down:

@@ -4,10 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from gcs.preflight import refusals
-from gcs.telemetry import Swarm
+from gcs.telemetry import Swarm, observe
 from scenarios import load
+from wire import parameters
+from wire.frames import Framer, Sender
+from wire.ids import AUTOPILOT
 from wire.modes import ARDUPILOT, PX4
 
 PROTECTED = {
@@ -49,12 +53,12 @@ def test_vehicles_that_protect_themselves_may_be_armed(autopilot):
     assert refusals(fleet(*[(autopilot, PROTECTED[autopilot])] * 6), SCENARIO) == ()
 
 
-def test_px4_as_delivered_does_nothing_when_the_ground_station_is_lost():
+def test_px4_as_delivered_stays_where_it_is_when_the_ground_station_is_lost_and_there_are_sticks():
     (why,) = refusals(fleet((PX4, AS_DELIVERED[PX4])), SCENARIO)
     assert why == (
-        "vehicle 1: COM_OBL_RC_ACT = 0 (position mode when set-points are lost) and NAV_DLL_ACT = 0 (nothing when the "
-        "ground station is lost, after COM_DL_LOSS_T = 10 s); COM_OBL_RC_ACT must be 3 or 4, or else 0 or 5 with "
-        "NAV_DLL_ACT 2 or 3 and COM_DL_LOSS_T at most 10"
+        "vehicle 1: COM_OBL_RC_ACT = 0 (position mode, or return without sticks, when set-points are lost) and "
+        "NAV_DLL_ACT = 0 (nothing when the ground station is lost, after COM_DL_LOSS_T = 10 s); COM_OBL_RC_ACT must be "
+        "3 or 4, or else 0 or 5 with NAV_DLL_ACT 2 or 3 and COM_DL_LOSS_T at most 10"
     )
 
 
@@ -83,7 +87,7 @@ def test_px4_may_notice_sooner(seconds):
 def test_px4_comes_down_or_home_by_one_of_two_ways(after_setpoints, after_link, link_s):
     """Return and land after set-points; or a harmless mode, out of which the lost link brings it in ten seconds.
 
-    Terminate and disarm let it fall, and in altitude mode or stabilized it drifts.
+    Terminate and disarm let it fall, and in altitude mode or stabilized, where there are sticks, it drifts or falls.
     """
     protected = after_setpoints in (3, 4) or (after_setpoints in (0, 5) and after_link in (2, 3) and link_s == 10)
     why = said_of(PX4, COM_OBL_RC_ACT=after_setpoints, NAV_DLL_ACT=after_link, COM_DL_LOSS_T=link_s)
@@ -124,6 +128,58 @@ def test_a_parameter_that_is_never_told_is_named(autopilot):
         (why,) = said_of(autopilot, without=(name,))
         assert why.startswith("vehicle 1: does not tell its parameter ")
         assert name in why
+
+
+WAYS_DOWN = "COM_OBL_RC_ACT must be 3 or 4, or else 0 or 5 with NAV_DLL_ACT 2 or 3 and COM_DL_LOSS_T at most 10"
+HOLDS = {"COM_OBL_RC_ACT": 5}
+"""A PX4 that only a lost link brings down."""
+WRONG = [
+    (PX4, "COM_OF_LOSS_T", 1.5, {}, "must be above 0 and at most 1"),
+    (PX4, "COM_OBL_RC_ACT", 1, {}, WAYS_DOWN),
+    (PX4, "NAV_DLL_ACT", 0, HOLDS, WAYS_DOWN),
+    (PX4, "COM_DL_LOSS_T", 11, HOLDS, WAYS_DOWN),
+    (PX4, "MPC_XY_VEL_MAX", 4.5, {}, "is below limits.speed_m_s = 5"),
+    (ARDUPILOT, "GUID_TIMEOUT", 3.5, {}, "must be above 0 and at most 3"),
+    (ARDUPILOT, "FS_GCS_ENABLE", 2, {}, "must be 1, 3, 4, 5, 6 or 7"),
+    (ARDUPILOT, "FS_GCS_TIMEOUT", 10.5, {}, "must be above 0 and at most 10"),
+    (ARDUPILOT, "SYSID_MYGCS", 254, {}, "must be 255"),
+    (ARDUPILOT, "MAV_GCS_SYSID", 254, {}, "must be 255"),
+    (ARDUPILOT, "WPNAV_SPEED", 450, {}, "is below limits.speed_m_s = 5"),
+    (ARDUPILOT, "WP_SPD", 4.5, {}, "is below limits.speed_m_s = 5"),
+]
+NEWER = {"SYSID_MYGCS": ("MAV_GCS_SYSID", 1.0), "WPNAV_SPEED": ("WP_SPD", 0.01)}
+"""Old name → new name, and the new unit's size of the old one's."""
+
+
+def told_over_the_wire(autopilot, told):
+    """A fleet of three of whom the last has told these parameters, as its autopilot writes them."""
+    heard = [dialect.MAVLink_heartbeat_message(2, autopilot, 1, 0, 3, 3)]
+    for name, value in told.items():
+        kind = dialect.MAV_PARAM_TYPE_INT32 if isinstance(value, int) else dialect.MAV_PARAM_TYPE_REAL32
+        wire = parameters.encode(value, kind, autopilot)
+        heard.append(dialect.MAVLink_param_value_message(name.encode(), wire, kind, 900, 1))
+    sender = Sender(3, AUTOPILOT)
+    return observe(Swarm.of((1, 2, 3)), Framer().frames(0, b"".join(map(sender.pack, heard))))
+
+
+def test_every_parameter_is_tried():
+    tried = {(autopilot, name) for autopilot, name, *_ in WRONG}
+    assert {name for _, name in tried} - {new for new, _ in NEWER.values()} == {
+        n for p in PROTECTED.values() for n in p
+    }
+
+
+@pytest.mark.parametrize(("autopilot", "name", "value", "beside", "allowed"), WRONG, ids=[case[1] for case in WRONG])
+def test_one_wrong_value_keeps_everybody_on_the_ground_and_is_named(autopilot, name, value, beside, allowed):
+    told = PROTECTED[autopilot] | beside
+    renamed = {NEWER[old][0]: right * NEWER[old][1] for old, right in told.items() if old in NEWER}
+    if name in renamed:
+        told = {old: right for old, right in told.items() if old not in NEWER} | renamed
+    assert refusals(told_over_the_wire(autopilot, told), SCENARIO) == ()
+    (why,) = refusals(told_over_the_wire(autopilot, told | {name: value}), SCENARIO)
+    assert why.startswith("vehicle 3: ")
+    assert f"{name} = {value:g} " in why
+    assert why.endswith(allowed)
 
 
 # --- speed
