@@ -11,12 +11,13 @@ from gcs.autopilots.ardupilot import ArduCopter
 from gcs.autopilots.protocol import UNKNOWN, Autopilot
 from gcs.autopilots.px4 import Px4
 from gcs.commands import Command, RequestParameter, RequestStream
+from gcs.gate import LOST_NS
 from gcs.parameters import untold
 from gcs.telemetry import NEVER, Flags, Swarm
 from wire.modes import ARDUPILOT, PX4
 
-HEARD_NS, PLACED_NS = 3_000_000_000, 1_000_000_000
-"""Age of a heartbeat, and of a position, from which nothing is known any more of a vehicle on the ground."""
+HEARD_NS = 3_000_000_000
+"""Age of a heartbeat from which nothing is known any more of a vehicle on the ground; of a position, it is LOST_NS."""
 THIN, THIN_S = 3.0, 0.2
 """A stream is too thin whose interval is both so many times what was asked for and so many seconds: a link that loses a
 third of all frames stretches it to about twice."""
@@ -115,7 +116,7 @@ class Fleet:
 
     def _placed(self, swarm: Swarm, row: int, now_ns: int) -> bool:
         """Whether it is known where a vehicle is by now."""
-        return bool(np.isfinite(swarm.position_ned[row]).all() and now_ns - swarm.position_ns[row] <= PLACED_NS)
+        return bool(np.isfinite(swarm.position_ned[row]).all() and now_ns - swarm.position_ns[row] <= LOST_NS)
 
     def _often(self, swarm: Swarm, row: int) -> bool:
         """Whether positions come, of late, as often as a lossy link lets them."""

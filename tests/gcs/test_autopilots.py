@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gcs.autopilots import Fleet
-from gcs.autopilots.fleet import HEARD_NS, PLACED_NS
+from gcs.autopilots.fleet import HEARD_NS
 from gcs.commands import (
     Arm,
     ChangeMode,
@@ -17,6 +17,7 @@ from gcs.commands import (
     TakeOff,
     TakeOffAboveHome,
 )
+from gcs.gate import LOST_NS
 from gcs.telemetry import Swarm
 from wire.modes import ARDUCOPTER_MODES, ARDUPILOT, PX4, PX4_MODES
 
@@ -77,7 +78,7 @@ def test_a_vehicle_of_which_everything_is_known_is_asked_for_nothing(autopilot):
 
 LACKING = {
     "position_ned": (np.full((1, 3), np.nan), RequestStream(32, 0.1), "position and velocity"),
-    "position_ns": (np.array([NOW - PLACED_NS - 1]), RequestStream(32, 0.1), "position and velocity"),
+    "position_ns": (np.array([NOW - LOST_NS - 1]), RequestStream(32, 0.1), "position and velocity"),
     "interval_s": (np.array([1.0]), RequestStream(32, 0.1), "positions every 0.1 s"),
     "heartbeat_ns": (np.array([NOW - HEARD_NS - 1]), RequestStream(1, 1.0), "a heartbeat"),
     "origin": (np.full((1, 3), np.nan), RequestMessage(49), "its origin"),
@@ -117,7 +118,7 @@ def test_but_five_positions_a_second_are_enough_however_many_were_asked_for(inte
 @both
 def test_a_vehicle_in_the_air_that_is_not_heard_is_asked_for_its_positions_again(autopilot):
     flying = {"armed": True, "height": HEIGHT, "interval_s": np.array([0.1])}
-    for age_ns, again in ((PLACED_NS, None), (PLACED_NS + 1, RequestStream(32, 0.1))):
+    for age_ns, again in ((LOST_NS, None), (LOST_NS + 1, RequestStream(32, 0.1))):
         swarm = vehicle(autopilot, position_ns=np.array([NOW - age_ns]), **flying)
         assert FLEET.next_to_hear(swarm, 0, NOW) == again
 
