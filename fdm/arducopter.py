@@ -14,7 +14,9 @@ It boots in STABILIZE. GUIDED is reported while it climbs, is steered, and holds
 in GUIDED, where it stops and stays. Set-points in other modes are ignored; in GUIDED one that comes before the vehicle
 has left the ground calls the take-off off, and none lifts it. Disarmed in LAND or RETURN it cannot be armed before
 another mode is set. LOITER, POSITION_HOLD, ALTITUDE_HOLD and STABILIZE read a throttle stick that nobody holds: they
-sink (a real STABILIZE would fall). BRAKE stops and stays.
+sink (a real STABILIZE would fall). BRAKE stops and stays. A ground station that was never heard cannot be lost: whoever
+steers and never sends a heartbeat leaves the vehicle hovering, as a real one does. One that is lost, while somebody
+still changes modes, is waited for anew.
 
 https://ardupilot.org/copter/docs/ac2_guidedmode.html
 https://ardupilot.org/dev/docs/copter-commands-in-guided-mode.html
@@ -39,6 +41,7 @@ from fdm.modes import (
     Situation,
     Vector,
     anchored,
+    borne_with,
     bound_home,
     comes_down,
     flyable,
@@ -119,7 +122,7 @@ def set_mode(pilot: Pilot, now: Situation, rules: Rules, mode: Mode | None) -> O
         return refuse(pilot, Result.FAILED, "Mode change failed: no such mode here")
     if mode is pilot.mode:
         return Outcome(pilot)
-    return Outcome(_changed(pilot, now, rules, mode))
+    return Outcome(_changed(borne_with(pilot, now), now, rules, mode))
 
 
 def hears(pilot: Pilot) -> bool:

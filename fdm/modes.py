@@ -124,7 +124,7 @@ class Pilot(NamedTuple):
     loss: Loss | None = None
     """Set while a failsafe waits to act."""
     station_s: float | None = None
-    """When a ground station was last heard."""
+    """When a ground station was last heard, or somebody flew on without it."""
     station_lost: bool = False
     """It has been silent for too long, and that has been dealt with."""
     grounded_since_s: float | None = None
@@ -220,6 +220,15 @@ def lost_at(pilot: Pilot, rules: Rules) -> float:
 def station_silent(pilot: Pilot, now: Situation, rules: Rules) -> bool:
     """Whether a ground station was heard once, and not for too long since."""
     return pilot.station_s is not None and over(pilot.station_s + rules.station_silence_s, now)
+
+
+def borne_with(pilot: Pilot, now: Situation) -> Pilot:
+    """Whoever changes the mode of a vehicle that has lost its ground station flies on: its patience begins again.
+
+    Real ones wait for the station then, and without it stay up for ever.
+    """
+    lost = pilot.armed and pilot.station_lost
+    return pilot._replace(station_s=now.time_s, station_lost=False) if lost else pilot
 
 
 def over(deadline: float, now: Situation) -> bool:

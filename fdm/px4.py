@@ -14,7 +14,7 @@
 Any mode may be asked for in any other, and disarmed: what was told TAKEOFF or OFFBOARD does so as soon as it is armed,
 as clients that arm last expect. After a silence the vehicle stays in HOLD, LAND or RETURN, whatever set-points come,
 until it is told OFFBOARD again. An OFFBOARD set-point that climbs takes off from the ground, as PX4 does. A ground
-station that was never heard cannot be lost.
+station that was never heard cannot be lost; one that is lost, while somebody still changes modes, is waited for anew.
 
 https://docs.px4.io/main/en/flight_modes/offboard.html
 https://docs.px4.io/main/en/config/safety.html
@@ -39,6 +39,7 @@ from fdm.modes import (
     Situation,
     Vector,
     anchored,
+    borne_with,
     bound_home,
     flyable,
     holding,
@@ -110,7 +111,7 @@ def take_off(pilot: Pilot, now: Situation, rules: Rules, height: float | None) -
         return refuse(pilot, Result.REJECTED, "Take-off denied: altitude is below home")
     anchor = north, east, -height
     return Outcome(
-        pilot._replace(mode=Mode.TAKEOFF, climbing=pilot.armed, anchor_ned=anchor, loss=None),
+        borne_with(pilot, now)._replace(mode=Mode.TAKEOFF, climbing=pilot.armed, anchor_ned=anchor, loss=None),
         words=((Severity.INFO, f"Takeoff to {height:.1f} meters above home"),),
     )
 
@@ -123,9 +124,8 @@ def set_mode(pilot: Pilot, now: Situation, rules: Rules, mode: Mode | None) -> O
         return take_off(pilot, now, rules, None)
     if mode is Mode.OFFBOARD and over(silent_at(pilot, rules), now):
         return refuse(pilot, Result.REJECTED, "Offboard denied: no set-points are coming")
-    if mode is pilot.mode:
-        return Outcome(pilot._replace(loss=None))
-    return Outcome(_changed(pilot, now, rules, mode))
+    pilot = borne_with(pilot, now)
+    return Outcome(pilot._replace(loss=None) if mode is pilot.mode else _changed(pilot, now, rules, mode))
 
 
 def hears(_pilot: Pilot) -> bool:

@@ -346,6 +346,28 @@ def test_five_seconds_after_the_ground_stations_last_heartbeat_it_lands_at_the_v
     assert not flight.pilot.armed
 
 
+def test_whoever_flies_on_without_the_ground_station_is_borne_with_for_as_long_as_it_was():
+    flight = copter().guided(20.0)
+    flight.beat()
+    flight.wait(6.0)
+    assert flight.pilot.mode is Mode.LAND
+    assert flight.ask(MODE, 1, GUIDED) == ACCEPTED
+    flight.endpoint.step(1249)
+    assert flight.pilot.mode is Mode.GUIDED
+    flight.endpoint.step(1)
+    assert flight.pilot.mode is Mode.LAND
+    flight.wait(30.0)
+    assert not flight.pilot.armed
+
+
+def test_who_never_sends_a_heartbeat_leaves_it_hovering():
+    flight = copter().guided(10.0)
+    flight.stream(2.0, (1.0, 0.0, 0.0))
+    flight.wait(120.0)
+    assert flight.pilot.mode is Mode.GUIDED
+    assert flight.position[2] == pytest.approx(-10.0, abs=0.3)
+
+
 def test_stock_it_hovers_for_ever_without_a_ground_station():
     flight = copter(stock=True).guided(10.0)
     flight.beat()

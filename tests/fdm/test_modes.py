@@ -269,15 +269,28 @@ def test_a_ground_station_that_was_never_heard_is_not_lost():
     assert (pilot.mode, said) == (Mode.HOLD, [])
 
 
-def test_a_person_may_fly_on_without_the_ground_station_that_is_lost():
+@pytest.mark.parametrize("asked", [Mode.OFFBOARD, Mode.HOLD, Mode.TAKEOFF])
+def test_a_person_may_fly_on_without_the_ground_station_that_is_lost_for_as_long_as_it_was_waited_for(asked):
     pilot, _ = live(flying(station_s=10.0), at, 11.0, 21.0)
-    pilot = px4.set_mode(px4.hear(pilot, Setpoint(21.0, NORTHWARDS)), at(21.0), RULES, Mode.OFFBOARD).pilot
+    assert (pilot.mode, pilot.station_lost) == (Mode.HOLD, True)
     pilot = px4.hear(pilot, Setpoint(1e3, NORTHWARDS))
-    pilot, said = live(pilot, at, 21.0, 60.0)
-    assert (pilot.mode, said) == (Mode.OFFBOARD, [])
-    back = px4.hear_station(pilot, at(60.0))
+    pilot = px4.set_mode(pilot, at(21.0), RULES, asked).pilot
+    pilot, said = live(pilot, lambda t: at(t, height=5.0), 21.0, 30.95)
+    assert (pilot.mode, said) == (asked, [])
+    pilot, said = live(pilot, lambda t: at(t, height=5.0), 31.0, 36.0)
+    assert pilot.mode is Mode.LAND
+    assert [word for _, word in said] == ["Ground station lost: holding", "Ground station is not back: landing"]
+    back = px4.hear_station(pilot, at(36.1))
     assert [word for _, word in back.words] == ["Ground station is heard again"]
-    assert live(back.pilot, at, 60.05, 70.05)[0].mode is Mode.HOLD
+
+
+@pytest.mark.parametrize("machine", [px4, arducopter])
+def test_on_the_ground_a_lost_ground_station_is_not_brought_back_by_a_mode(machine):
+    told = rules(table("px4" if machine is px4 else "ardupilot"))
+    pilot = Pilot(station_s=10.0, station_lost=True)
+    mode = Mode.RETURN if machine is px4 else Mode.GUIDED
+    pilot = machine.set_mode(pilot, standing(50.0), told, mode).pilot
+    assert not machine.arm(pilot, standing(50.1), told).pilot.armed
 
 
 def test_a_ground_station_lost_while_it_holds_for_want_of_set_points_moves_no_landing():
