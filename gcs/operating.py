@@ -14,6 +14,7 @@ from gcs.commands import RequestStream
 from gcs.console import asked, say
 from gcs.events import HOLD, LAND, kill, take_back
 from gcs.flight_state import Phase
+from gcs.guard import BAD_INPUT, DONE, NOT_DONE
 from gcs.interventions import (
     HEAR_S,
     HOLDING,
@@ -32,14 +33,15 @@ from gcs.reach import Call, Ended, Refused, Unanswered
 from gcs.roster import Roster, listed
 from gcs.routes import id_of, name_of
 from gcs.standing import Standing
-from wire.connection import Connection
+from wire.connection import Connection, ConnectionRefused
+from wire.signing import SigningKeyError
 
-DONE, BAD_INPUT, NOT_DONE = 0, 2, 3
-"""Exit codes; of several links the worst."""
 RETURN_S = 8.0
 """A vehicle that was taken back flies our set-points within this, or stays whose it is."""
 _STILL, _STEERED = ("hold", "brake"), ("offboard", "guided")
 _COMING_DOWN = (Phase.LAND.value, Phase.DONE.value)
+_FAILURES = (Unanswered, Refused, ConnectionRefused, SigningKeyError)
+"""Of one link: they keep no other from being landed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,13 +151,13 @@ def back_to_the_flight(links: Links, system: int) -> int:
 def _order(links: Links, order: Order, only: tuple[int, ...], word: str, done: Callable[[Standing], bool]) -> int:
     """Through each flight that has a link; by ourselves where none has, or where it ends before all is done.
 
-    All flights are told before any is watched, and one that does not listen keeps no other from being told.
+    All are told before any is watched, and one that cannot be told keeps no other from it. Exit code, the worst.
     """
     flights = links.flights
     if flights and only:
         raise BadUsageError(
             f"--vehicle: the flight of process {flights[0].process} has this link, and {order.word}s as a whole, "
-            f"without --vehicle. One alone: its own remote control takes it from the flight, `gcs kill` drops it"
+            "without --vehicle. One alone: take it by its remote control, or have all land and then give this again"
         )
     codes, ended, calls = [DONE], list[Card](), list[Call]()
     with ExitStack() as stack:
@@ -163,7 +165,7 @@ def _order(links: Links, order: Order, only: tuple[int, ...], word: str, done: C
             try:
                 call = stack.enter_context(Call(flight))
                 call.tell(word)
-            except (Unanswered, Refused) as error:
+            except _FAILURES as error:
                 codes.append(_said(error))
             except Ended:
                 ended.append(flight)
@@ -175,7 +177,7 @@ def _order(links: Links, order: Order, only: tuple[int, ...], word: str, done: C
         for call in calls:
             try:
                 codes.append(_watched(call, order, done))
-            except (Unanswered, Refused) as error:
+            except _FAILURES as error:
                 codes.append(_said(error))
             except Ended:
                 say("the flight has ended before that; going on without it")
@@ -183,7 +185,7 @@ def _order(links: Links, order: Order, only: tuple[int, ...], word: str, done: C
     return max(codes)
 
 
-def _said(error: Unanswered | Refused) -> int:
+def _said(error: Exception) -> int:
     say(f"gcs: {error}")
     return NOT_DONE if isinstance(error, Unanswered) else BAD_INPUT
 
@@ -203,11 +205,14 @@ def _watched(call: Call, order: Order, done: Callable[[Standing], bool]) -> int:
 
 
 def _by_ourselves(links: Links, order: Order, only: tuple[int, ...]) -> int:
-    with opened(links.connections, None, purpose=STEPS_IN, signing_key=links.signing_key) as live:
-        outcome = Intervention(order, live, live, say, only=only).carry_out()
-        if not outcome.done:
-            say(f"gcs: nobody has{_refused(live)}" if outcome.not_done else f"gcs: nobody is heard{_refused(live)}")
-        code = _told(order, outcome, live)
+    try:
+        with opened(links.connections, None, purpose=STEPS_IN, signing_key=links.signing_key) as live:
+            outcome = Intervention(order, live, live, say, only=only).carry_out()
+            if not outcome.done:
+                say(f"gcs: nobody {'has' if outcome.not_done else 'is heard'}{_refused(live)}")
+            code = _told(order, outcome, live)
+    except _FAILURES as error:
+        return _said(error)
     if code == DONE and order is HOLDING:
         say("from now on they hear no ground station: what they do then, and how soon, their failsafe parameters say")
     return code

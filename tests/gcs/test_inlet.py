@@ -12,9 +12,9 @@ from flights import SHORT, Saying, messages, scratch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gcs.clients import BUFFER, CLIENTS, LINE, LINES_A_TICK, Conversation
 from gcs.events import LAND, Rating
 from gcs.inlet import HOST, Inlet
-from gcs.clients import BUFFER, CLIENTS, LINE, LINES_A_TICK, Conversation
 from gcs.lockstep import Lockstep
 from gcs.operator import Operator
 from gcs.ratings import RatingsError, parse, written

@@ -293,6 +293,15 @@ def test_one_that_is_not_is_refused_with_what_to_do(gcs, monkeypatch):
 
 
 @pytest.mark.wall_clock
+def test_one_that_is_not_keeps_no_flight_from_being_told_and_watched(gcs, monkeypatch):
+    monkeypatch.setattr(links, "GIVEN_BACK_S", 0.2)
+    with held(14997, seconds=60.0), flying() as words:
+        code, _, err = gcs("land", "--link", LINK, "--link", "udpin:127.0.0.1:14997")
+    assert (code, words) == (2, ["land"])
+    assert err.endswith("end what listens there\nland: done\n")
+
+
+@pytest.mark.wall_clock
 def test_a_device_that_is_not_there_is_not_waited_for(gcs):
     began = time.monotonic()
     code, _, err = gcs("land", "--link", "serial:/dev/nothing")
