@@ -29,7 +29,6 @@ from wire.connection import Connection
 
 STATUS = "status"
 """Asks how the flight stands."""
-_COMING_DOWN = (Phase.LAND.value, Phase.DONE.value)
 
 
 class ControlSocket:
@@ -55,10 +54,7 @@ class ControlSocket:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._card is not None:
-            self._card.remove()
-        if self._lines is not None:
-            self._lines.close({"over": True, **self._standing.told()})
+        self._end()
 
     def take(self) -> tuple[str, ...]:
         """Words of the operator that came since the last call; to be called once a tick, from tick 0 on."""
@@ -67,8 +63,17 @@ class ControlSocket:
         return tuple(word for word in self._lines.take() if word != STATUS)
 
     def tick(self, tick: Tick) -> None:
-        """Remember how the flight stands."""
+        """Remember how the flight stands. Its last tick is the last that can answer."""
         self._standing = Standing.at(tick)
+        if tick.diagnosis.phase is Phase.DONE:
+            self._end()
+
+    def _end(self) -> None:
+        if self._card is not None:
+            self._card.remove()
+        if self._lines is not None:
+            self._lines.close({"over": True, **self._standing.told()})
+        self._card = self._lines = None
 
     def _understood(self, line: bytes) -> str:
         try:
@@ -84,7 +89,7 @@ class ControlSocket:
             raise ValueError(f"vehicle {named} is not one of this flight, which has {listed(sorted(self._ids))}")
         if named is None and word not in (LAND, HOLD, STATUS):
             raise ValueError(f'{word!r}: allowed are "land", "hold", "kill ID", "take back ID" and "status"')
-        if word == HOLD and self._standing.phase in _COMING_DOWN:
+        if word == HOLD and self._standing.phase == Phase.LAND.value:
             raise ValueError("the flight is landing, and goes on landing: hold comes too late")
         return word
 

@@ -169,13 +169,12 @@ def said_to(control, call, *words):
     return control.take(), [orjson.loads(line) for line in call._socket.recv(1 << 16).splitlines()]
 
 
-@pytest.mark.parametrize("phase", [Phase.LAND, Phase.DONE])
-def test_hold_is_refused_by_a_flight_that_lands_and_land_is_not(phase):
+def test_hold_is_refused_by_a_flight_that_lands_and_land_is_not():
     fleet = Fleet()
     with ControlSocket(parse(LINK), (1, 2, 3), say=str) as control, Call(found()) as call:
         control.tick(fleet.tick())
         assert said_to(control, call, "hold") == (("hold",), [{"tick": 0}])
-        fleet.phase = phase
+        fleet.phase = Phase.LAND
         control.tick(fleet.tick())
         words, answers = said_to(control, call, "hold", "land")
         assert words == ("land",)
@@ -187,6 +186,18 @@ def test_whoever_calls_a_flight_that_has_just_gone_hears_that_it_has():
         flight = found()
     with pytest.raises(Ended):
         Call(flight)
+
+
+def test_a_flight_whose_last_tick_is_done_is_under_way_no_more_though_its_picture_is_still_drawn():
+    fleet = Fleet()
+    fleet.phase = Phase.DONE
+    with ControlSocket(parse(LINK), (1, 2, 3), say=str) as control:
+        card = found()
+        control.tick(fleet.tick())
+        assert under_way(parse(LINK)) == ()
+        with pytest.raises(Ended):
+            Call(card)
+        assert control.take() == ()
 
 
 def test_a_word_said_while_the_flight_ends_is_answered_with_how_it_ended():
