@@ -38,7 +38,8 @@ class Server:
     """Vehicles speak to one ground station each, or all to one, and listen to nobody else.
 
     shared: all vehicles speak through one port. separate: vehicle i has one of its own, numbered i − 1 higher. Where
-    ground stations speak first (udpin, tcpin), the first who does is the one, until it has been silent for GONE_S.
+    ground stations speak first (udpin, tcpin), the first who does is the one, until it has been silent for GONE_S or,
+    on tcpin, has hung up.
     """
 
     def __init__(
@@ -101,14 +102,18 @@ class Server:
     def _is_the_station(self, peer: Peer) -> bool:
         now_s = time.monotonic()
         station = self._stations.get(peer.port)
-        if station is None or (station.peer != peer and now_s - station.heard_s > GONE_S):
-            if station is not None:
-                self._hub.forget(station.peer)
+        if station is not None and station.peer != peer and self._has_gone(station, now_s):
+            self._hub.forget(station.peer)
+            station = None
+        if station is None:
             self._stations[peer.port] = station = _Station(peer, now_s)
             self._hub.know(peer)
         elif station.peer == peer:
             station.heard_s = now_s
         return station.peer == peer
+
+    def _has_gone(self, station: _Station, now_s: float) -> bool:
+        return now_s - station.heard_s > GONE_S or self._hub.has_gone(station.peer)
 
     def _send(self) -> None:
         for _step, system, frame in self._world.collect():

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from wire.connection import Address, Connection, ConnectionRefused
 from wire.frames import Frame, Framer, StreamFramer
+from wire.lines import TcpInPort
 from wire.ports import Port, UdpPort, open_port
 from wire.signing import Signer
 
@@ -137,6 +138,10 @@ class Hub:
     def known(self) -> frozenset[Peer]:
         """Peers that were given sockets of their own."""
         return frozenset(self._own)
+
+    def has_gone(self, peer: Peer) -> bool:
+        """Whether it called us and has hung up: it can neither speak nor be answered any more."""
+        return isinstance(peer.port, TcpInPort) and not peer.port.hears(peer.address)
 
     def send(self, peer: Peer, frame: bytes) -> bool:
         """Send one frame, signed where we sign. False where it did not leave."""

@@ -275,6 +275,10 @@ class TcpInPort:
         lines = [(address, self._callers[address]) for address in wanted if address in self._callers]
         return sum(1 for address, line in lines if self._try(address, partial(line.write, data))) > 0
 
+    def hears(self, address: Address | None) -> bool:
+        """Whether this caller's line stands."""
+        return address in self._callers
+
     def close(self) -> None:
         """Give the port back."""
         for line in self._callers.values():

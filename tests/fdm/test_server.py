@@ -2,6 +2,7 @@
 
 import contextlib
 import itertools
+import select
 import socket
 import time
 
@@ -9,7 +10,7 @@ import pytest
 from clients import ARM, HZ, LOCAL_POSITION, REQUEST, SET_INTERVAL, TAKE_OFF, VERSION, Station, command, scenario
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from fdm.server import Server
+from fdm.server import GONE_S, Server
 from fdm.world import SITE, World
 from wire.connection import Connection, ConnectionRefused
 from wire.signing import Signer
@@ -290,6 +291,21 @@ def test_a_client_over_tcp_is_answered_over_tcp():
             return client.all("AUTOPILOT_VERSION", system=2) and client.all("HEARTBEAT", system=1)
 
         turn_until(server, [], answered)
+
+
+@pytest.mark.wall_clock
+def test_a_client_over_tcp_that_hung_up_is_followed_at_once_and_one_that_did_not_is_not():
+    def asks(line, client):
+        line.sendall(client.pack(command(REQUEST, VERSION)))
+
+    with waiting(abreast(1), kind="tcpin") as (server, address), socket.create_connection(address) as second:
+        with socket.create_connection(address) as first:
+            asks(first, Station())
+            turn_until(server, [], lambda: select.select([first], [], [], 0)[0])
+            asks(second, Station())
+            turn_until(server, [], lambda: server.rejections == {"wrong address": 1})
+        asks(second, Station())
+        turn_until(server, [], lambda: select.select([second], [], [], 0)[0], limit_s=GONE_S / 3)
 
 
 @pytest.mark.wall_clock
