@@ -9,6 +9,7 @@ import numpy as np
 import orjson
 
 from gcs.autopilots import Fleet
+from gcs.guard import DONE, NOT_DONE
 from gcs.links import refused
 from gcs.live import Live
 from gcs.roster import listed
@@ -39,7 +40,7 @@ def listen(live: Live, scenario: Scenario, *, as_json: bool, say: Callable[[str]
     for words in (*_against(live, swarm), *([refused(live.rejections)] if missing else [])):
         if words is not None:
             say(words)
-    return 3 if missing else 0
+    return NOT_DONE if missing else DONE
 
 
 def before_arming(live: Live, scenario: Scenario, *, say: Callable[[str], None]) -> tuple[str, ...]:
