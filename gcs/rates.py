@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -31,6 +31,8 @@ USUAL_SPEEDS = (57_600, 115_200, 230_400, 460_800, 921_600, 1_500_000, 3_000_000
 """Bits a second that radios and autopilots can be set to."""
 LONGEST_PERIOD_S = 0.4
 """What a scenario may say: vehicles lose patience after 0.5 s."""
+
+Links = tuple[Connection, ...]
 
 
 class LinkTooSlow(ValueError):
@@ -56,22 +58,29 @@ class _Load:
 def positions_per_tick(connections: Iterable[Connection], scenario: Scenario, *, signed: bool) -> int:
     """How often in a tick vehicles are to tell where they are: 5 to 1, as every serial link allows.
 
-    Where the scenario says how often, it is that or nothing. Vehicles are taken to be shared evenly among the links.
-    Raises LinkTooSlow.
+    Where the scenario says how often, it is that or nothing. Who is behind which link is not known yet: they are taken
+    to be shared evenly where every link is serial; beside a network, which may as well be unused, each serial link must
+    carry them all. Raises LinkTooSlow.
     """
-    links = list(connections)
+    links = tuple(connections)
     told = scenario.time.positions_per_tick
     wanted = range(POSITIONS_AT_MOST, 0, -1) if told is None else (told,)
-    slow = [link for link in links if link.bits_per_s is not None]
-    if not slow:
-        return wanted[0]
-    vehicles = math.ceil(scenario.swarm.count / len(links))
-    slowest = min(slow, key=_carries)
     load = _load(signed=signed)
     for positions in wanted:
-        if vehicles * load.each(scenario.time.period_s, positions) <= _carries(slowest):
+        if _fit(links, scenario.swarm.count, load.each(scenario.time.period_s, positions)):
             return positions
-    raise LinkTooSlow(_sentence(slowest, scenario, vehicles, load, wanted[-1], signed=signed))
+    raise LinkTooSlow(_sentence(links, scenario, load, wanted[-1], signed=signed))
+
+
+def _fit(links: Links, vehicles: int, each: float) -> bool:
+    """Whether every serial link carries those who may be behind it; each: bytes a second of one vehicle."""
+    serial = [link for link in links if link.bits_per_s is not None]
+    return all(_behind(links, vehicles) * each <= _carries(link) for link in serial)
+
+
+def _behind(links: Links, vehicles: int) -> int:
+    """How many may be behind a serial link."""
+    return math.ceil(vehicles / len(links)) if all(link.bits_per_s is not None for link in links) else vehicles
 
 
 def _load(*, signed: bool) -> _Load:
@@ -96,8 +105,9 @@ def _carries(link: Connection) -> float:
     return link.bits_per_s / BITS_A_BYTE * (1 - RESERVE)
 
 
-def _sentence(link: Connection, scenario: Scenario, vehicles: int, load: _Load, positions: int, *, signed: bool) -> str:
-    period_s = scenario.time.period_s
+def _sentence(links: Links, scenario: Scenario, load: _Load, positions: int, *, signed: bool) -> str:
+    link = min((link for link in links if link.bits_per_s is not None), key=_carries)
+    vehicles, period_s = _behind(links, scenario.swarm.count), scenario.time.period_s
     each = load.each(period_s, positions)
     hz, raw = 1 / period_s, (link.bits_per_s or 0) / BITS_A_BYTE
     return (
@@ -105,24 +115,32 @@ def _sentence(link: Connection, scenario: Scenario, vehicles: int, load: _Load, 
         f"{vehicles * each:.0f} bytes/s both ways (each {hz:g} set-points of {load.setpoint}, {positions * hz:g} "
         f"positions of {load.position} and {load.slow:.0f} of heartbeats and slow streams), and "
         f"{link.bits_per_s} / {BITS_A_BYTE} = {raw:g} less {RESERVE:.0%} in reserve is {_carries(link):.0f}; "
-        f"what would fit: {', or '.join(_remedies(link, scenario, vehicles, load, positions))}"
+        f"what would fit: {', or '.join(_remedies(links, scenario, load, positions))}"
     )
 
 
-def _remedies(link: Connection, scenario: Scenario, vehicles: int, load: _Load, positions: int) -> list[str]:
-    """What would have to be otherwise, each alone."""
-    period_s, carries = scenario.time.period_s, _carries(link)
+def _remedies(links: Links, scenario: Scenario, load: _Load, positions: int) -> list[str]:
+    """What would have to be otherwise, each alone and tried."""
+    vehicles, time = scenario.swarm.count, scenario.time
+    each = load.each(time.period_s, positions)
     remedies = []
-    if fewer := int(carries / load.each(period_s, positions)):
-        remedies.append(f"{fewer} vehicle{'s' if fewer > 1 else ''} on this link")
-    if (left := carries - vehicles * load.slow) > 0:
-        hz = scenario.time.physics_hz
-        longer_s = math.ceil(vehicles * (load.setpoint + positions * load.position) / left * hz - 1e-9) / hz
-        if longer_s <= LONGEST_PERIOD_S:
-            remedies.append(f"time.period_s = {longer_s:g}")
-    if positions > 1:
-        remedies.append("a smaller time.positions_per_tick")
-    needed = vehicles * load.each(period_s, positions) * BITS_A_BYTE / (1 - RESERVE)
-    speed = next((usual for usual in USUAL_SPEEDS if usual >= needed), None)
-    remedies.append(f"{speed} bits/s" if speed else "a network instead of a serial link")
-    return remedies
+    if fewer := next((count for count in range(vehicles, 0, -1) if _fit(links, count, each)), 0):
+        remedies.append(f"{fewer} vehicle{'s' if fewer > 1 else ''}")
+    longer = range(time.steps_per_tick + 1, math.floor(LONGEST_PERIOD_S * time.physics_hz) + 1)
+    for period_s in (steps / time.physics_hz for steps in longer):
+        if _fit(links, vehicles, load.each(period_s, positions)):
+            remedies.append(f"time.period_s = {period_s}")
+            break
+    for rarer in range(positions - 1, 0, -1):
+        if _fit(links, vehicles, load.each(time.period_s, rarer)):
+            remedies.append(f"time.positions_per_tick = {rarer}")
+            break
+    everywhere = " on every serial link" if sum(link.bits_per_s is not None for link in links) > 1 else ""
+    for speed in USUAL_SPEEDS:
+        if _fit(tuple(_at_least(speed, link) for link in links), vehicles, each):
+            return [*remedies, f"{speed} bits/s{everywhere}"]
+    return [*remedies, f"a network instead of {'serial links' if everywhere else 'a serial link'}"]
+
+
+def _at_least(speed: int, link: Connection) -> Connection:
+    return link if link.bits_per_s is None else replace(link, bits_per_s=max(speed, link.bits_per_s))

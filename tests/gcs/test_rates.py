@@ -88,13 +88,13 @@ def test_six_vehicles_do_not_fit_57600_baud_at_10_hz_both_ways_and_the_arithmeti
     assert refused(serial(57_600), transit()) == (
         "serial:/dev/ttyUSB0:57600: 6 vehicles at 10 Hz need 6 × 1222 = 7332 bytes/s both ways (each 10 set-points of "
         "65, 10 positions of 40 and 172 of heartbeats and slow streams), and 57600 / 10 = 5760 less 10% in reserve is "
-        "5184; what would fit: 4 vehicles on this link, or time.period_s = 0.152, or 115200 bits/s"
+        "5184; what would fit: 4 vehicles, or time.period_s = 0.152, or 115200 bits/s"
     )
 
 
 def test_what_the_refusal_says_would_fit_does_fit_and_no_more():
     assert positions_per_tick(serial(57_600), transit(vehicles=4), signed=False) == 1
-    assert "4 vehicles on this link" in refused(serial(57_600), transit(vehicles=5))
+    assert "4 vehicles, or" in refused(serial(57_600), transit(vehicles=5))
     assert positions_per_tick(serial(57_600), transit(period_s=0.152), signed=False) == 1
     refused(serial(57_600), transit(period_s=0.148))
     assert positions_per_tick(serial(115_200), transit(), signed=False) >= 1
@@ -116,7 +116,32 @@ def test_where_the_scenario_says_how_often_it_is_that_or_nothing():
     assert positions_per_tick(serial(57_600), transit(vehicles=4, positions=1), signed=False) == 1
     words = refused(serial(57_600), transit(vehicles=4, positions=2))
     assert "20 positions of 40" in words
-    assert "or a smaller time.positions_per_tick" in words
+    assert ", or time.positions_per_tick = 1, or " in words
+    assert positions_per_tick(serial(57_600), transit(vehicles=4, positions=1), signed=False) == 1
+
+
+def test_what_would_not_fit_either_is_not_offered():
+    assert "positions_per_tick" not in refused(serial(57_600), transit(vehicles=6, positions=2))
+    assert "vehicle" not in refused(serial(1_200), transit()).split("what would fit")[1]
+    words = refused([*serial(9_600), *serial(19_200)], transit())
+    assert words.endswith("what would fit: 57600 bits/s on every serial link")
+    raised = [parse(f"serial:/dev/ttyUSB{n}:57600")[0] for n in range(2)]
+    assert positions_per_tick(raised, transit(), signed=False) == 2
+    odd = load("transit", overrides=["time.physics_hz=300", "time.period_s=0.1"])
+    longer_s = float(refused(serial(57_600), odd).split("time.period_s = ")[1].split(",")[0])
+    assert positions_per_tick(serial(57_600), odd.model_validate(told_period(odd, longer_s)), signed=False) == 1
+
+
+def told_period(scenario, period_s):
+    told = scenario.model_dump()
+    return told | {"time": told["time"] | {"period_s": period_s}}
+
+
+def test_beside_a_network_that_may_be_unused_a_serial_link_must_carry_all():
+    one = transit(vehicles=3)
+    assert positions_per_tick([*serial(57_600), *UDP], one, signed=False) == 2
+    assert "57600: 6 vehicles at" in refused([*serial(57_600), *UDP], transit())
+    assert "57600: 6 vehicles at" in refused([*serial(57_600, count=5), *UDP], transit())
 
 
 def test_vehicles_are_shared_among_links_and_the_slowest_serial_one_decides():
@@ -124,7 +149,6 @@ def test_vehicles_are_shared_among_links_and_the_slowest_serial_one_decides():
     assert positions_per_tick(serial(57_600, count=2), transit(), signed=False) == 2
     assert positions_per_tick([*serial(57_600), *serial(921_600)], transit(), signed=False) == 2
     assert positions_per_tick([*serial(921_600), *serial(57_600)], transit(), signed=False) == 2
-    assert positions_per_tick([*serial(57_600), *UDP], transit(), signed=False) == 2
 
 
 @pytest.mark.parametrize("signed", [False, True])
