@@ -67,6 +67,14 @@ def test_a_vehicle_degraded_on_the_way_is_the_papers_failed_robot(degraded):
 
 
 @pytest.mark.wall_clock
+def test_the_summary_says_how_each_vehicle_was_heard_and_that_nothing_was_refused(degraded):
+    _, summary = degraded
+    assert (summary["rejected_frames"], summary["rejections"]) == (0, {})
+    assert summary["loss"].keys() == set("123456")
+    assert all(0.0 <= loss < 0.05 for loss in summary["loss"].values())
+
+
+@pytest.mark.wall_clock
 def test_the_recording_has_what_the_controller_sent_and_can_be_decided_again(degraded):
     folder, _ = degraded
     assert decide_again(folder / "run" / "run.mcap").difference is None
