@@ -12,10 +12,12 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from fdm.parameter_tables import REAL32
 from fdm.parameters import Parameter, Parameters
 from fdm.streams import Schedule
 from wire.frames import Frame, Sender
 from wire.ids import AUTOPILOT
+from wire.parameters import decode, encode
 
 LISTING = -6
 """Key of the schedule at which the next parameter of a list is due."""
@@ -42,6 +44,7 @@ class ParameterService:
         self._sender = sender
         self._parameters = parameters
         self._schedule = schedule
+        self._autopilot = autopilot
         self._is_px4 = autopilot == dialect.MAV_AUTOPILOT_PX4
         self._next = len(parameters)
 
@@ -87,25 +90,17 @@ class ParameterService:
         return self._value(parameter, parameter.index if self._is_px4 else NO_INDEX)
 
     def _value(self, parameter: Parameter, index: int) -> list[bytes]:
-        value = self._encoded(parameter)
+        value = encode(parameter.value, parameter.kind, self._autopilot)
         name = parameter.name.encode()
         payload = _VALUE.pack(value, len(self._parameters), index, name, parameter.kind)
         return [self._sender.frame(VALUE, payload)]
 
-    def _encoded(self, parameter: Parameter) -> bytes:
-        """PX4 puts a whole number's bits in the place of a float, ArduPilot its value."""
-        if self._is_px4 and parameter.kind != dialect.MAV_PARAM_TYPE_REAL32:
-            return struct.pack("<i", int(parameter.value))
-        return struct.pack("<f", parameter.value)
-
     def _decoded(self, value: bytes, kind: int) -> float:
-        """The opposite; ArduPilot cuts what is behind the point of a whole number."""
-        if self._is_px4 and kind != dialect.MAV_PARAM_TYPE_REAL32:
-            return float(struct.unpack("<i", value)[0])
-        number: float = struct.unpack("<f", value)[0]
-        if kind == dialect.MAV_PARAM_TYPE_REAL32 or not math.isfinite(number):
-            return number
-        return float(math.trunc(number + math.copysign(ROUNDING, number)))
+        """What is asked for; ArduPilot, whose whole numbers come as floats, cuts what is behind the point."""
+        if self._is_px4 or kind == REAL32:
+            return float(decode(value, kind, self._autopilot))
+        number = float(decode(value, REAL32, self._autopilot))
+        return float(math.trunc(number + math.copysign(ROUNDING, number))) if math.isfinite(number) else number
 
     def _is_for_us(self, system: int, component: int) -> bool:
         return system in (0, self._sender.system) and component in (0, AUTOPILOT)

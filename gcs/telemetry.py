@@ -314,7 +314,7 @@ def _parameter(draft: _Draft, row: int, frame: Frame) -> None:
     told, autopilot = decode(frame), int(draft.get("autopilot", row))
     if not depends_on(autopilot, told.param_id):
         return
-    value = parameters.decode(told.param_value, told.param_type, autopilot)
+    value = parameters.decode(frame.payload, told.param_type, autopilot)
     if math.isfinite(value):
         draft.set("parameters", row, {**draft.get("parameters", row), told.param_id: value})
 

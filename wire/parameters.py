@@ -25,33 +25,24 @@ _WHOLE = {
 _FLOAT = struct.Struct("<f")
 
 
-def encode(value: float, kind: int, autopilot: int) -> float:
-    """What the field holds for a value, as a float that survives float32.
+def encode(value: float, kind: int, autopilot: int) -> bytes:
+    """The four bytes that the field holds for a value: by PX4's way some look like no number, and must keep their bits.
 
     kind: MAV_PARAM_TYPE;  autopilot: MAV_AUTOPILOT of whose parameter it is. Raises ValueError where it does not fit.
     """
     whole = _WHOLE.get(kind)
     try:
-        if whole is None:
-            return _single(value)
-        data = whole.pack(int(value))
-        told = float(_FLOAT.unpack(data)[0]) if autopilot == PX4 else _single(int(value))
+        data = _FLOAT.pack(value) if whole is None else whole.pack(int(value))
+        return data if whole is None or autopilot == PX4 else _FLOAT.pack(int(value))
     except (struct.error, OverflowError, ValueError):
         raise ValueError(f"{value} does not fit a parameter of type {kind}") from None
-    if autopilot == PX4 and _FLOAT.pack(told) != data:  # a signalling NaN, which no double can hold
-        raise ValueError(f"{value} cannot be told of a parameter of type {kind}")
-    return told
 
 
-def decode(wire_value: float, kind: int, autopilot: int) -> float | int:
-    """The value that a field holds; where a converted whole number is none (NaN, infinity), what was told."""
+def decode(payload: bytes, kind: int, autopilot: int) -> float | int:
+    """The value that a payload begins with; where a converted whole number is none (NaN, infinity), what was told."""
+    field = payload[: _FLOAT.size].ljust(_FLOAT.size, b"\0")
     whole = _WHOLE.get(kind)
-    if whole is None:
-        return wire_value
-    if autopilot == PX4:
-        return int(whole.unpack(_FLOAT.pack(wire_value))[0])
-    return int(wire_value) if math.isfinite(wire_value) else wire_value
-
-
-def _single(value: float) -> float:
-    return float(_FLOAT.unpack(_FLOAT.pack(value))[0])
+    if whole is not None and autopilot == PX4:
+        return int(whole.unpack(field)[0])
+    told: float = _FLOAT.unpack(field)[0]
+    return told if whole is None or not math.isfinite(told) else int(told)

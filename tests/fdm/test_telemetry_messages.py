@@ -3,6 +3,7 @@
 import itertools
 import math
 import random
+import struct
 
 import numpy as np
 import pymap3d
@@ -467,7 +468,7 @@ def test_a_client_on_a_lossy_link_gets_all_parameters_by_list_and_by_index(name)
                 got[value.param_index] = value
     table = station.world.endpoints[0].parameters
     autopilot = PERSONALITIES[name].autopilot
-    read = {m.param_id: decode(m.param_value, m.param_type, autopilot) for m in got.values()}
+    read = {m.param_id: decode(struct.pack("<f", m.param_value), m.param_type, autopilot) for m in got.values()}
     assert read == {parameter.name: parameter.value for parameter in table}
 
 

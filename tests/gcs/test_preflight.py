@@ -1,5 +1,6 @@
 """What keeps a fleet on the ground, and in which words."""
 
+import struct
 from dataclasses import replace
 
 import numpy as np
@@ -156,7 +157,7 @@ def told_over_the_wire(autopilot, told):
     heard = [dialect.MAVLink_heartbeat_message(2, autopilot, 1, 0, 3, 3)]
     for name, value in told.items():
         kind = dialect.MAV_PARAM_TYPE_INT32 if isinstance(value, int) else dialect.MAV_PARAM_TYPE_REAL32
-        wire = parameters.encode(value, kind, autopilot)
+        (wire,) = struct.unpack("<f", parameters.encode(value, kind, autopilot))
         heard.append(dialect.MAVLink_param_value_message(name.encode(), wire, kind, 900, 1))
     sender = Sender(3, AUTOPILOT)
     return observe(Swarm.of((1, 2, 3)), Framer().frames(0, b"".join(map(sender.pack, heard))))

@@ -1,5 +1,6 @@
 """What is known of the fleet: a fold of frames."""
 
+import struct
 from copy import deepcopy
 from dataclasses import fields, replace
 from math import inf, nan
@@ -352,7 +353,7 @@ def test_accuracy_is_what_a_receiver_with_a_fix_claims_and_infinite_where_it_cla
 @pytest.mark.parametrize(("kind", "value"), [(9, 0.5), (9, 3.0), (6, 4), (2, 5), (4, 255), (6, -1)])
 def test_a_parameter_is_read_as_its_autopilot_writes_it(autopilot, kind, value):
     name = {PX4: "NAV_DLL_ACT", ARDUPILOT: "FS_GCS_ENABLE"}[autopilot]
-    told = said(parameter(name, parameters.encode(value, kind, autopilot), kind))
+    told = said(parameter(name, *struct.unpack("<f", parameters.encode(value, kind, autopilot)), kind))
     swarm = observe(FLEET, [beat(autopilot), told])
     assert swarm.parameters == ({}, {name: value}, {})
 
