@@ -15,7 +15,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from gcs.flight import Flight
+from gcs.flight import STALE_NS, Flight
 from gcs.flight_state import Phase
 from gcs.loop import Tick
 from gcs.telemetry import Flags
@@ -80,7 +80,8 @@ class Display:
             if phase is not self._phase:
                 self._console.print(f"{_clock(tick, self._flight)}  {phase.value}", highlight=False)
             elif phase is Phase.JOIN and tick.number % self._flight.scenario.time.ticks(WAITING_S) == 0:
-                self._console.print(f"{_clock(tick, self._flight)}  {_waiting(tick)}", highlight=False)
+                waiting = "; ".join(self._flight.lacking(tick.swarm, tick.time_ns))
+                self._console.print(f"{_clock(tick, self._flight)}  waiting for {waiting}", highlight=False)
         elif self._due(phase):
             self._shown = time.monotonic()
             self._live.update(self._screen(tick), refresh=True)
@@ -175,12 +176,6 @@ def _in_other_hands(before: Flags, tick: Tick) -> Iterator[str]:
         yield f"vehicle {system} is not ours any more: nothing is sent to it" if taken else f"vehicle {system} is ours"
 
 
-def _waiting(tick: Tick) -> str:
-    swarm = tick.swarm
-    missing = [str(system) for row, system in enumerate(swarm.ids) if swarm.heartbeat_ns[row] < 0]
-    return f"waiting for {', '.join(missing) or 'all to be ready'}"
-
-
 def _clock(tick: Tick, flight: Flight) -> str:
     mission_s = tick.diagnosis.mission_s
     if math.isnan(mission_s):
@@ -202,7 +197,7 @@ def _age(now_ns: int, position_ns: int) -> Text:
     if position_ns <= 0:
         return Text("not heard", style="yellow")
     age_s = (now_ns - position_ns) / 1e9
-    return Text(f"{age_s:.2f} s", style="red" if age_s > 0.3 else "")
+    return Text(f"{age_s:.2f} s", style="red" if age_s > STALE_NS / 1e9 else "")
 
 
 def _trust_bar(trust: float) -> Text:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from io import StringIO
 
+import numpy as np
 import pytest
 from flights import recorded
 from rich.console import Console
@@ -10,9 +11,10 @@ from rich.console import Console
 from gcs.answers import Answer
 from gcs.events import Rating
 from gcs.flight import Flight
+from gcs.flight_state import Phase
 from gcs.hands import killed
 from gcs.loop import fly
-from gcs.progress import MOST_ROWS, Display
+from gcs.progress import MOST_ROWS, WAITING_S, Display
 from gcs.recording.reader import ticks
 from gcs.replay import EndOfRecording, Recorded
 from scenarios import load
@@ -132,6 +134,15 @@ def test_before_a_vehicle_is_heard_it_says_so(flight):
     assert last_picture(screen).count("not heard") == 6
     assert "nan" not in screen
     assert "joining" in screen
+
+
+def test_without_a_terminal_it_is_said_who_keeps_a_flight_waiting_and_for_what(flight):
+    decided, turns = flight
+    joined = next(turn for turn in turns if turn.diagnosis.phase is not Phase.JOIN)
+    swarm = replace(joined.swarm, home_m=np.where(np.arange(6) == 2, np.nan, joined.swarm.home_m))
+    waits = replace(turns[0], swarm=swarm, time_ns=joined.time_ns)
+    later = replace(waits, number=decided.scenario.time.ticks(WAITING_S))
+    assert shown(decided, [waits, later], width=80).splitlines()[-1].endswith("waiting for vehicle 3: its home")
 
 
 def test_the_whole_flight_can_be_shown_and_leaves_the_terminal_as_it_was(flight):
