@@ -183,7 +183,7 @@ class Flight:
             return self._take_control(entered(state, Phase.TAKE_CONTROL), swarm, now_ns)
         patience_s = PATIENCE_S + self.scenario.swarm.altitude_m
         if self._phase_s(state) > patience_s:
-            told = ((~swarm.armed, "are not armed"), (swarm.armed & ~hovering, "do not hover at their height"))
+            told = ((~swarm.armed, "not armed"), (swarm.armed & ~hovering, "not hovering at height"))
             return self._land(self._in_vain(state, swarm, told, patience_s), swarm, now_ns)
         state, ask = self._ask(state, swarm, lambda row: some(self._fleet.next_to_fly(swarm, row)))
         return state, ask, self._overview(state, swarm)
@@ -196,7 +196,7 @@ class Flight:
         if streaming_s > STREAM_FIRST_S and obeying.all() and hovering.all():
             return self._run_up(entered(state, Phase.RUN_UP), swarm, now_ns)
         if streaming_s > PATIENCE_S:
-            told = ((~obeying, "do not fly our set-points"), (obeying & ~hovering, "do not hover at their height"))
+            told = ((~obeying, "not flying our set-points"), (obeying & ~hovering, "not hovering at height"))
             return self._land(self._in_vain(state, swarm, told, PATIENCE_S), swarm, now_ns)
         ask: Commands = []
         if streaming_s >= STREAM_FIRST_S:

@@ -104,9 +104,9 @@ def test_then_it_lands_when_its_own_parameters_say_so(left):
         if endpoint.personality.name == "px4":
             hold_s = limit("COM_OF_LOSS_T")
             expected = [(0.0, Mode.OFFBOARD), (hold_s, Mode.HOLD), (hold_s + limit("COM_FAIL_ACT_T"), Mode.LAND)]
-        else:  # its patience begins with the last heartbeat, which comes once a second
+        else:  # its patience begins with the last heartbeat, which comes twice a second
             landing_s = modes[-1][0]
-            assert limit("FS_GCS_TIMEOUT") - 1.0 <= landing_s <= limit("FS_GCS_TIMEOUT")
+            assert limit("FS_GCS_TIMEOUT") - 0.5 <= landing_s <= limit("FS_GCS_TIMEOUT")
             expected = [(0.0, Mode.GUIDED), (landing_s, Mode.LAND)]
         assert [mode for _, mode in modes] == [mode for _, mode in expected]
         assert [time_s for time_s, _ in modes] == pytest.approx([time_s for time_s, _ in expected], abs=0.1)
@@ -140,7 +140,7 @@ def test_a_silent_vehicle_weighs_nothing_at_the_first_tick_after_three_tenths_of
     assert np.delete(weights[first][:, FIVE], FIVE).max() == 0.0
     assert np.delete(weights[first - 1][:, FIVE], FIVE).max() > 0.0
     assert len(stale) == pytest.approx((FOUND_S - LOST_S) * 10, abs=5)
-    assert all(np.delete(weights[tick][:, FIVE], FIVE).max() == 0.0 for tick in stale)
+    assert all(np.delete(weights[tick][:, FIVE], FIVE).max() == 0.0 for tick in weights if tick >= first)
 
 
 def test_the_others_go_on_and_arrive(lost):
@@ -153,12 +153,12 @@ def test_the_others_go_on_and_arrive(lost):
     assert time_s[-1] == column(recorded("transit"), "/truth/pose", "position_m")[0][-1]
 
 
-def test_when_it_comes_back_it_is_heard_but_not_armed_and_from_its_first_heartbeat_on_not_steered(lost):
+def test_when_it_comes_back_it_is_heard_but_neither_heeded_nor_steered_nor_armed(lost):
     heard = {row["tick"]: row["age_s"][FIVE] or 0.0 for row in told(lost, "/swarm/state")}
     found = next(tick for tick in heard if heard[tick] < 0.2 and heard.get(tick - 1, 0.0) > 1.0)
     assert max(heard[tick] for tick in range(found, found + 60)) < 0.2
     steered = [row["tick"] for row in told(lost, "/setpoint") if row["commanded"] and row["commanded"][FIVE]]
-    assert max(steered) <= found + 10
+    assert max(steered) < found
     armed = [place for place, (system, frame) in enumerate(lost.link.sent) if system == 5 and arms(frame)]
     to_five = [place for place, (system, _) in enumerate(lost.link.sent) if system == 5]
     assert armed
