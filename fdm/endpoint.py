@@ -11,7 +11,8 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from fdm.answers import Answers
 from fdm.commands import MESSAGES as COMMANDS
 from fdm.commands import obey, request
-from fdm.modes import ON_TIME, Outcome, Pilot, Result, Severity, Situation, heading
+from fdm.helm import Helm
+from fdm.modes import ON_TIME, Outcome, Pilot, Result, Severity, Situation
 from fdm.parameter_service import LISTING
 from fdm.parameters import Parameters, table
 from fdm.personality import PX4, Personality
@@ -22,7 +23,7 @@ from fdm.shaping import SHAPING_S, Level, Motion
 from fdm.streams import NEVER, Schedule
 from fdm.surroundings import PERIOD_S, Surroundings
 from fdm.telemetry import MEASUREMENTS, Reporter
-from fdm.vehicle import FlightModelDiverged, Geodetic, Vector, Vehicle
+from fdm.vehicle import FlightModelDiverged, Geodetic, Vehicle
 from scenarios.models import Noise
 from wire.frames import Frame, Framer
 from wire.ids import AUTOPILOT
@@ -74,10 +75,7 @@ class Endpoint:
         self._machine = personality.machine
         self._rules = rules(self.parameters)
         self._inlet = Inlet(personality.frames)
-        self._shape = shape
-        self._motion: Motion | None = None
-        """What is asked of the flight controller, where set-points are shaped and flown."""
-        self._wanted_ned = (0.0, 0.0, 0.0)
+        self._helm = Helm(vehicle, surroundings, personality.machine, shape)
         self._hz = physics_hz
         self._home = home
         self._reporter = Reporter(
@@ -238,7 +236,7 @@ class Endpoint:
             elif key == SAMPLING:
                 self._surroundings.sensors.note((*now.position_ned, *now.velocity_ned), now.time_s)
             elif key == SHAPING:
-                self._take_up()
+                self._helm.take_up(self._pilot)
             elif key == WATCHDOG:
                 self._watch()
             elif key == LISTING:
@@ -249,35 +247,7 @@ class Endpoint:
                 self.tell(key)
 
     def _fly(self, *, dt: float) -> None:
-        """Hand the mode's velocity to the flight controller, through whatever is wrong with it; dt: s of yaw rate."""
-        pilot, now = self._pilot, self._situation()
-        velocity = self._machine.velocity(pilot, now, self._rules)
-        steered = self._machine.steered(pilot)
-        if steered:
-            velocity = self._shaped(self._surroundings.flown(velocity, now.time_s), now)
-        else:
-            self._motion = None
-        yaw = heading(pilot, dt, steered=steered)
-        if yaw != pilot.yaw:
-            self._pilot = pilot._replace(yaw=yaw)
-        self.vehicle.set_velocity(velocity, yaw)
-
-    def _shaped(self, velocity_ned: Vector, now: Situation) -> Vector:
-        """Where a slow vehicle is on its way to this velocity. It begins with the one it has."""
-        if self._shape is None:
-            return velocity_ned
-        self._wanted_ned = velocity_ned
-        if self._motion is None:
-            self._motion = Motion((now.velocity_ned[0], now.velocity_ned[1]))
-        return (*self._motion.velocity_ne, velocity_ned[2])
-
-    def _take_up(self) -> None:
-        """Every SHAPING_S: a little nearer to what is wanted."""
-        if self._shape is None or self._motion is None or not self._machine.steered(self._pilot):
-            return
-        north, east, down = self._wanted_ned
-        self._motion = self._shape(self._motion, (north, east))
-        self.vehicle.set_velocity((*self._motion.velocity_ne, down), self._pilot.yaw)
+        self._pilot = self._helm.fly(self._pilot, self._situation(), self._rules, dt=dt)
 
     def _position_target(self, frame: Frame) -> None:
         target = unpack_position_target(frame.payload)

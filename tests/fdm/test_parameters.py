@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fdm.modes import HOLD_GAIN
 from fdm.parameter_tables import INT8, INT16, INT32, REAL32, Entry
 from fdm.parameters import Parameters, table
 from fdm.rules import Action, rules
@@ -226,3 +227,8 @@ def test_each_code_of_lost_set_points_is_an_action(code, action):
     px4 = table("px4")
     assert px4.set("COM_OBL_RC_ACT", code)
     assert rules(px4).after_setpoints is action
+
+
+def test_the_gain_that_px4_names_is_the_one_with_which_a_place_is_held():
+    assert table("px4").get("MPC_XY_P") == pytest.approx(HOLD_GAIN, rel=1e-6)
+    assert not table("px4").set("MPC_XY_P", 0.5)
