@@ -67,6 +67,8 @@ def opened(
         live.close()
         if signer is not None:
             signer.save()
+            if signer.trouble is not None:
+                say(f"gcs: {signer.trouble}")
 
 
 def refused(rejections: Mapping[str, int]) -> str | None:

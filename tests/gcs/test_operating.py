@@ -2,6 +2,7 @@
 
 import os
 import pty
+import shutil
 import socket
 import subprocess
 import threading
@@ -335,3 +336,28 @@ def test_a_spoilt_memory_keeps_everybody_from_taking_off(tmp_path):
     empty(tmp_path / "key.flies")
     with pytest.raises(SigningKeyError), links.opened([], (1,), purpose=links.FLIES, signing_key=tmp_path / "key"):
         pass
+
+
+def test_a_memory_that_could_not_be_written_in_the_end_is_told(tmp_path, capsys):
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    (folder / "key").write_text("swordfish")
+    with links.opened([], (1,), purpose=links.FLIES, signing_key=folder / "key"):
+        shutil.rmtree(folder)
+    words = capsys.readouterr().err
+    assert words == f"gcs: signing memory {folder / 'key.flies'}: cannot be written: No such file or directory\n"
+
+
+def test_who_flies_and_who_steps_in_or_listens_keep_apart_memories_and_the_same_one_is_nobodys_twice(tmp_path, capsys):
+    key = tmp_path / "key"
+    key.write_text("swordfish")
+    with links.opened([], (1,), purpose=links.FLIES, signing_key=key):
+        for purpose in (links.STEPS_IN, links.LISTENS):
+            with links.opened([], (1,), purpose=purpose, signing_key=key):
+                pass
+        assert capsys.readouterr().err == ""
+        with (
+            pytest.raises(SigningKeyError, match="is in use by another program"),
+            links.opened([], (1,), purpose=links.FLIES, signing_key=key),
+        ):
+            pass
