@@ -17,6 +17,7 @@ import numpy as np
 import orjson
 from mcap.reader import NonSeekingReader
 from mcap.writer import Writer
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from gcs.flight import Flight
 from gcs.lockstep import Lockstep
@@ -26,6 +27,7 @@ from gcs.recording.reader import Flown, read
 from gcs.session import flown
 from gcs.summary import Summary
 from scenarios import Scenario, load
+from wire.modes import ARDUCOPTER_MODES, PX4_MODES
 
 SOAK = os.environ.get("TRUSTR_PROFILE") == "soak"
 SEEDS = range(1, 31 if SOAK else 2)
@@ -84,6 +86,40 @@ class Severed:
 
     def _lost(self, system, time_ns):
         return system == self._system and self._from_ns <= time_ns < self._to_ns
+
+
+def mode_command(autopilot, mode):
+    """(main, sub) of DO_SET_MODE."""
+    if autopilot == "ardupilot":
+        return ARDUCOPTER_MODES[mode], 0
+    return PX4_MODES[mode].main, PX4_MODES[mode].sub
+
+
+class OtherStation:
+    """A link beside which another ground station changes one vehicle's mode, so many seconds after it was made."""
+
+    def __init__(self, link, clock, *, system, mode, at_s):
+        self._link, self._clock, self._system, self._mode = link, clock, system, mode
+        self._at_ns = clock.now() + round(at_s * 1e9)
+        self._said = False
+
+    def receive(self):
+        if not self._said and self._clock.now() >= self._at_ns:
+            self._said = True
+            words = dialect.MAVLink(None, srcSystem=254, srcComponent=190)
+            main, sub = self._mode
+            message = words.command_long_encode(
+                self._system, 1, dialect.MAV_CMD_DO_SET_MODE, 0, 1, main, sub, 0, 0, 0, 0
+            )
+            self._link.send(self._system, message.pack(words))
+        return self._link.receive()
+
+    def send(self, system, frame):
+        self._link.send(system, frame)
+
+    @property
+    def rejected(self):
+        return self._link.rejected
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,8 @@ from functools import cache
 
 import numpy as np
 import pytest
+from flights import SHORT, Counting, OtherStation, mode_command
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from gcs.autopilots import Fleet
 from gcs.flight import Flight
@@ -26,10 +28,10 @@ SLOW = (
     "trust.response_acceleration_m_s2=2.35", "trust.response_jerk_m_s3=3.8",
 )  # fmt: skip
 """As ArduCopter answers to set-points with its stock gains; `scenarios/experiments/further.toml` has the same."""
-SHORT = ("mission.leg.0.length_m=3", "mission.leg.1.length_m=4.5", "mission.run_up_s=1")
 NEAR_M = 0.3
 """From the target, after so short a way without faults."""
 APART_M = 50.0
+ENCODED = dialect.MAVLink(None)
 
 
 @cache
@@ -101,6 +103,22 @@ def test_a_mixed_fleet_flies_one_formation():
     alone, _ = trial("demo", *SHORT)
     assert result.distance_to_target_m < NEAR_M
     assert np.abs(mixed.position[-1] - alone.position[-1]).max() < 0.1
+
+
+@pytest.mark.parametrize(("system", "autopilot"), [(2, "px4"), (5, "ardupilot")])
+def test_of_a_mixed_fleet_a_pilot_takes_one_vehicle_and_the_others_fly_on(system, autopilot):
+    scenario = load("demo", overrides=SHORT)
+    here, there = (Lockstep.of(scenario, seed=1, autopilot=name) for name in AUTOPILOTS)
+    mixed = Mixed(here, there, there_from=4)
+    pilot = OtherStation(mixed, mixed, system=system, mode=mode_command(autopilot, "return"), at_s=13.0)
+    link = Counting(pilot)
+    state = fly(link, mixed, Flight(scenario), (), period_ns=scenario.time.period_ns)
+    assert state.problem.startswith(f"vehicle {system} was taken over by another (return)")
+    assert np.flatnonzero(state.released).tolist() == [system - 1]
+    asked = [to for to, frame in link.sent if ENCODED.decode(bytearray(frame)).get_type() != "HEARTBEAT"]
+    to_others = asked[len(asked) - asked[::-1].index(system) :]
+    assert len(to_others) > 5 * 30
+    assert set(to_others) == set(range(1, 7)) - {system}
 
 
 # --- one formation, wherever each counts from

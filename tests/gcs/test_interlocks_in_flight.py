@@ -5,7 +5,7 @@ from itertools import count
 
 import numpy as np
 import pytest
-from flights import SHORT, Counting, fly_and_record, recorded, told
+from flights import SHORT, Counting, OtherStation, fly_and_record, mode_command, recorded, told
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from gcs.events import HOLD, LAND, kill
@@ -14,45 +14,10 @@ from gcs.lockstep import Lockstep
 from gcs.loop import fly
 from gcs.replay import decide_again
 from scenarios import load
-from wire.modes import ARDUCOPTER_MODES, PX4_MODES
 
 AUTOPILOTS = ("px4", "ardupilot")
 SYSTEM = 4
 OTHERS = [0, 1, 2, 4, 5]
-
-
-def mode_command(autopilot, mode):
-    """(main, sub) of DO_SET_MODE."""
-    if autopilot == "ardupilot":
-        return ARDUCOPTER_MODES[mode], 0
-    return PX4_MODES[mode].main, PX4_MODES[mode].sub
-
-
-class OtherStation:
-    """A link beside which another ground station changes one vehicle's mode, so many seconds after it was made."""
-
-    def __init__(self, link, clock, *, system, mode, at_s):
-        self._link, self._clock, self._system, self._mode = link, clock, system, mode
-        self._at_ns = clock.now() + round(at_s * 1e9)
-        self._said = False
-
-    def receive(self):
-        if not self._said and self._clock.now() >= self._at_ns:
-            self._said = True
-            words = dialect.MAVLink(None, srcSystem=254, srcComponent=190)
-            main, sub = self._mode
-            message = words.command_long_encode(
-                self._system, 1, dialect.MAV_CMD_DO_SET_MODE, 0, 1, main, sub, 0, 0, 0, 0
-            )
-            self._link.send(self._system, message.pack(words))
-        return self._link.receive()
-
-    def send(self, system, frame):
-        self._link.send(system, frame)
-
-    @property
-    def rejected(self):
-        return self._link.rejected
 
 
 def mission_starts_s(autopilot):
