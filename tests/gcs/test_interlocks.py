@@ -191,7 +191,7 @@ def test_nobody_is_armed_where_preflight_refuses():
     assert not log.ticks_of(Arm)
 
 
-@pytest.mark.parametrize("how", ["released", "in another mode"])
+@pytest.mark.parametrize("how", ["released", "in another mode", "mute"])
 def test_steering_itself_sends_nothing_to_who_is_not_ours(how):
     """Whoever asks it to."""
     scenario = load("demo")
@@ -200,6 +200,8 @@ def test_steering_itself_sends_nothing_to_who_is_not_ours(how):
     state = replace(NOMINAL.states[MIDDLE], start_ns=START, tick=0)
     if how == "released":
         state = replace(state, hands=killed(state.hands, 3, 0))
+    elif how == "mute":
+        state = replace(state, hands=replace(state.hands, mute=np.arange(6) == 3))
     else:
         swarm = replace(swarm, custom_mode=np.where(np.arange(6) == 3, MODE["position"], swarm.custom_mode))
     _, commands, told = steering.send(state, swarm, START, np.ones((6, 3)), NOMINAL.diagnoses[MIDDLE])
