@@ -10,7 +10,7 @@ from obedient import EVERYBODY, MODE, PERIOD_S, PROTECTED, START, Fleet, Log
 from gcs import losses
 from gcs.asking import RETRY_S
 from gcs.autopilots import Fleet as Autopilots
-from gcs.commands import Arm, ChangeMode, Kill, Land, SetVelocity, TakeOff
+from gcs.commands import Arm, ChangeMode, Kill, Land, RequestStream, SetVelocity, TakeOff
 from gcs.events import HOLD, LAND, kill, take_back
 from gcs.flight import TOLD_S
 from gcs.flight_state import Phase
@@ -222,6 +222,21 @@ def test_the_operator_takes_a_vehicle_back_and_it_flies_with_the_others_again():
     assert not log.states[back + 5].released.any()
     assert (weights(log, back + 5)[[0, 1, 2, 4, 5], 3] > 0).all()
     assert "vehicle 4 was taken over" in log.end.problem
+
+
+def test_what_is_taken_back_in_flight_goes_on_from_how_fast_it_is():
+    back = MIDDLE + 10
+    dashes = {MIDDLE: pilot("position"), back: lambda fleet: fleet.set("velocity_ned", 4, (4.0, 0.0, 0.0))}
+    log = Log(Fleet(happens=dashes), events=said((back, take_back(4))))
+    first = next(command for tick, command in log.to(4) if tick == back and isinstance(command, SetVelocity))
+    assert np.hypot(first.north - 4.0, first.east) <= 1.001
+
+
+def test_nobody_asks_a_vehicle_of_somebody_elses_for_more_positions():
+    thin = {MIDDLE: pilot("position"), MIDDLE + 1: lambda fleet: fleet.set("interval_s", 4, 1.0)}
+    assert sent_after(Log(Fleet(happens=thin)), 4, MIDDLE) == []
+    ours = {MIDDLE + 1: lambda fleet: fleet.set("interval_s", 4, 1.0)}
+    assert RequestStream in {type(command) for _, command in sent_after(Log(Fleet(happens=ours)), 4, MIDDLE)}
 
 
 def test_what_a_pilot_does_not_give_is_not_taken():
