@@ -167,6 +167,7 @@ def test_a_return_flies_home_and_lands_there():
 )
 def test_commands_of_old_clients_are_understood(number, kind):
     flight = ready()
+    flight.heard.clear()
     assert flight.ask(number, LOCAL_POSITION) == ACCEPTED
     assert len(flight.all(kind)) == 1
 
