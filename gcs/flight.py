@@ -16,6 +16,7 @@ import numpy.typing as npt
 from gcs import leaving, losses, mission, preflight
 from gcs.asking import Asking, some
 from gcs.autopilots import Fleet
+from gcs.autopilots.fleet import HEARD_NS
 from gcs.beliefs import Beliefs, Seen
 from gcs.commands import Beat, Command
 from gcs.control import settings
@@ -36,8 +37,8 @@ from trustr.roles import taken_back
 
 Array = npt.NDArray[np.float64]
 
-STALE_NS, UNSURE_NS = 300_000_000, 3_000_000_000
-"""Age of telemetry, and of a heartbeat, from which a vehicle has weight 0."""
+STALE_NS = 300_000_000
+"""Age of telemetry from which a vehicle has weight 0."""
 PATIENCE_S = 60.0
 """All vehicles must be heard and ready by then; so long a climb may take beside a second for each metre, and so long
 taking control."""
@@ -372,5 +373,5 @@ def _by_tick(scenario: Scenario, ratings: Iterable[Rating]) -> dict[int, tuple[R
 
 def _sure(swarm: Swarm, now_ns: int) -> Flags:
     """(N,) of whom we know well enough where they are, and in what mode."""
-    beats = now_ns - swarm.heartbeat_ns <= UNSURE_NS
+    beats = now_ns - swarm.heartbeat_ns <= HEARD_NS
     return np.asarray(beats & swarm.fresh(now_ns, within_ns=STALE_NS))

@@ -17,7 +17,7 @@ from gcs.telemetry import NEVER, Flags, Swarm
 from wire.modes import ARDUPILOT, PX4
 
 HEARD_NS = 3_000_000_000
-"""Age of a heartbeat from which nothing is known any more of a vehicle on the ground; of a position, it is LOST_NS."""
+"""Age of a heartbeat from which a vehicle's mode is not known any more."""
 THIN, THIN_S = 3.0, 0.2
 """A stream is too thin whose interval is both so many times what was asked for and so many seconds: a link that loses a
 third of all frames stretches it to about twice."""

@@ -6,9 +6,10 @@ import pytest
 from obedient import EVERYBODY, HEIGHT, MODES, PERIOD_NS, PERIOD_S, Fleet, Log
 
 from gcs.asking import RETRY_S
+from gcs.autopilots.fleet import HEARD_NS
 from gcs.commands import Arm, ChangeMode, Kill, Land, SetVelocity
 from gcs.events import HOLD, LAND, kill, take_back
-from gcs.flight import GIVEN_UP_NS, LANDING_S, PATIENCE_S, UNSURE_NS
+from gcs.flight import GIVEN_UP_NS, LANDING_S, PATIENCE_S
 from gcs.flight_state import Phase
 from gcs.gate import LOST_NS, WITHHELD
 from gcs.hands import FAR, MUTE_NS, RETURNS_S
@@ -207,7 +208,7 @@ def test_what_another_station_steers_while_we_hold_is_its_own(autopilot, mode):
 
 def test_who_does_not_tell_its_mode_weighs_nothing_and_then_gets_nothing():
     log = Log(Fleet(mute={4: MIDDLE}), **LONG)
-    unsure, mute = MIDDLE - 1 + UNSURE_NS // PERIOD_NS, MIDDLE - 1 + MUTE_NS // PERIOD_NS
+    unsure, mute = MIDDLE - 1 + HEARD_NS // PERIOD_NS, MIDDLE - 1 + MUTE_NS // PERIOD_NS
     assert [heeded(log, tick) for tick in (unsure, unsure + 1)] == [True, False]
     assert sent_after(log, mute + 1) == []
     assert log.ticks_of(SetVelocity, 4)[-1] == mute
