@@ -59,7 +59,7 @@ def test_every_frame_that_went_is_in_it(flight, held):
     went = [data for topic, _, data in held if topic == GROUND]
     assert went == [frame for _, frame in flight.link.sent]
     (beats, setpoints) = (Counter(frame[7] for frame in went)[message] for message in (0, 84))
-    assert beats == 6 * -(-len(contents(held, "/tick")) // 10)
+    assert beats == 6 * -(-len(contents(held, "/tick")) // 5)
     assert setpoints > 1900
 
 
