@@ -145,7 +145,7 @@ class Hub:
 
     def send(self, peer: Peer, frame: bytes) -> bool:
         """Send one frame, signed where we sign. False where it did not leave."""
-        data = frame if self._signer is None else self._signer.sign(frame)
+        data = frame if self._signer is None else self._signer.sign(frame, place=self._ports.index(peer.port))
         own = self._own.get(peer)
         return peer.port.send(data, peer.address) if own is None else own.send(data)
 

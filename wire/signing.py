@@ -34,6 +34,9 @@ AHEAD_AT_MOST = 365 * 86_400 * TICKS_PER_S
 STREAMS_AT_MOST = 1024
 """Streams that are told apart; only who holds the key can open one."""
 
+PROGRAMS = 4
+"""Link ids of one component's first port; those of its other ports follow so far apart."""
+
 KEY_FILE_AT_MOST = 4096
 
 Stream = tuple[int, int, int]
@@ -77,7 +80,7 @@ class Signer:
              of the next 2 s are refused); without one a frame can be played again after a restart, within a minute.
              On the disk it is only from a start and an orderly end: where the machine lost power, what was said since
              the start can be played again
-    link:    link id of what leaves, 0 to 255: two programs that sign as the same component must differ in it
+    link:    link id of what leaves by the first port: two programs that sign as the same component differ in it, 0 to 3
     wall:    seconds since 1970
     """
 
@@ -108,15 +111,20 @@ class Signer:
             if self.trouble is not None:
                 raise SigningKeyError(self.trouble)
 
-    def sign(self, frame: bytes) -> bytes:
-        """An unsigned MAVLink 2 frame with its signature, and the checksum that goes with it."""
+    def sign(self, frame: bytes, *, place: int = 0) -> bytes:
+        """An unsigned MAVLink 2 frame with its signature, and the checksum that goes with it.
+
+        place: of the port by which it leaves, among all of the program. Each has a link id of its own: what leaves by
+        several is not heard in the order in which it was signed, and in one stream the later would make the earlier old
+        """
         if frame[0] != MAGIC_2 or frame[2]:
             raise ValueError("only a MAVLink 2 frame without flags can be signed")
         message = int.from_bytes(frame[7:10], "little")
         self._last = min(max(self._now(), self._last + 1), LAST_TICK)
-        stream = (frame[5], frame[6], self._link)
+        link = (self._link + PROGRAMS * place) % 256
+        stream = (frame[5], frame[6], link)
         signed = sealed(frame[1:2] + bytes([SIGNED]) + frame[3:-CRC], message)
-        signed += bytes([self._link]) + self._last.to_bytes(6, "little")
+        signed += bytes([link]) + self._last.to_bytes(6, "little")
         self._note(stream, self._last)
         return signed + self._digest(signed)
 

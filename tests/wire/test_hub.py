@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from wire.connection import Connection, ConnectionRefused
 from wire.frames import Sender
 from wire.hub import AT_ONCE, STRANGERS_AT_ONCE_S, STRANGERS_SHARE, Hub
+from wire.signing import Signer
 
 pytestmark = pytest.mark.wall_clock
 
@@ -226,3 +227,21 @@ def test_senders_are_not_mixed_up_when_ports_are_shared_by_many():
         assert names == {system: vehicle.getsockname() for system, vehicle in enumerate(vehicles, start=1)}
     for vehicle in vehicles:
         vehicle.close()
+
+
+def test_what_is_signed_for_many_ports_in_turn_is_admitted_by_who_reads_port_after_port():
+    key, ends = bytes(32), [bound() for _ in range(6)]
+    addresses = [end.getsockname() for end in ends]
+    for end in ends:
+        end.close()
+    vehicles = Hub([Connection("udpin", *address) for address in addresses], signer=Signer(key))
+    station = Hub([Connection("udpout", *address) for address in addresses], signer=Signer(key))
+    with closing(vehicles), closing(station):
+        for _ in ("strangers, a datagram of each in turn", "known, all of one and then of the next"):
+            for peer in station.spoken_to_first * 2:
+                station.send(peer, beat(255, 190))
+            said = heard(vehicles, until=12)
+            assert len(said) == 12
+            for peer, _ in said:
+                vehicles.know(peer)
+        assert vehicles.rejections.total() == 0

@@ -235,6 +235,12 @@ def test_streams_are_told_apart_by_system_component_and_link(wall):
         assert judge.refusal(cut(signed)) == "replayed"
 
 
+def test_every_port_of_every_program_has_a_link_id_of_its_own(wall):
+    programs = [Signer(KEY, link=link, wall=wall) for link in range(4)]
+    signed = [program.sign(heartbeat(Sender(255, 190)), place=place) for program in programs for place in range(64)]
+    assert sorted(frame[-13] for frame in signed) == list(range(256))
+
+
 @pytest.mark.parametrize(("late_s", "verdict"), [(0.0, None), (59.9, None), (60.1, "replayed"), (-59.0, None)])
 def test_a_new_stream_may_be_a_minute_old_by_our_clock(wall, late_s, verdict):
     signed = Signer(KEY, wall=Wall(wall.now - late_s)).sign(heartbeat(Sender(9, 1)))
