@@ -51,7 +51,7 @@ class ArduCopter:
 
     def climbing(self, swarm: Swarm) -> Flags:
         """(N,) off the ground in GUIDED."""
-        off = ~np.isin(swarm.landed_state, (ON_GROUND, UNKNOWN))
+        off = (swarm.landed_state != ON_GROUND) & (swarm.landed_state != UNKNOWN)
         return np.asarray(swarm.armed & off & (swarm.custom_mode == _GUIDED))
 
     def hovering(self, swarm: Swarm) -> Flags:

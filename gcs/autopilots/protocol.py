@@ -77,7 +77,7 @@ class Autopilot(Protocol):
 
 def in_modes(swarm: Swarm, *modes: int) -> Flags:
     """(N,) whose heartbeat shows one of these."""
-    return np.asarray(np.isin(swarm.custom_mode, modes))
+    return np.asarray((swarm.custom_mode[:, None] == modes).any(axis=1))  # np.isin sorts: five times as long for six
 
 
 def may_arm(swarm: Swarm, row: int) -> bool:
