@@ -369,7 +369,7 @@ def test_a_run_names_the_sources_of_the_process_that_flew_it(monkeypatch):
 
 
 def test_the_keys_of_rules_that_ship_stay_what_they_were(monkeypatch):
-    """As in journals since scenarios have a fence; a change of the scenario's keys or defaults changes them, and must be meant."""
+    """As since scenarios have a fence; a change of the scenario's keys or defaults changes them, and must be meant."""
     monkeypatch.setattr(run, "version", lambda _: "0.1.0")
     assert tasks(load_experiment("base"), seeds=1)[0].key == "c9bc8c264104534f7a08"
 
