@@ -12,9 +12,13 @@ from gcs.events import LAND, Event, Rating
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Ctrl-C, a polite kill, a terminal that is closed."""
 
+ENDS = 2
+"""Ctrl-C so often ends the flight: between two ticks, for a record that is being written would be torn."""
+
 
 class Operator:
-    """Turns signals into the event LAND. A second Ctrl-C ends the process at once, its recording closed.
+    """Turns signals into the event LAND. A second Ctrl-C ends the process at its next tick, its recording closed and
+    whole; a third wherever it is, should there be no next tick.
 
     No other signal does, however often it comes: a terminal that is closed hangs up twice. A process that was started
     to outlive its terminal (nohup) is not landed by it.
@@ -33,8 +37,8 @@ class Operator:
         self._ratings = ratings
         self._asked = self._told = 0
         """Signals that came, counted by their handler alone, and those of them that were handed out."""
-        self._pressed = False
-        """Ctrl-C."""
+        self._pressed = 0
+        """Times that Ctrl-C was."""
 
     @property
     def interrupted(self) -> bool:
@@ -54,6 +58,8 @@ class Operator:
 
     def events(self) -> tuple[Event, ...]:
         """What came since the last call; what is to be said of it is said here, outside the signal."""
+        if self._pressed >= ENDS:
+            raise KeyboardInterrupt
         asked = self._asked
         landing = (LAND,) if asked > self._told else ()
         self._told = asked
@@ -65,9 +71,9 @@ class Operator:
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         if number == signal.SIGINT:
-            if self._pressed:
+            self._pressed += 1
+            if self._pressed > ENDS:
                 raise KeyboardInterrupt
-            self._pressed = True
         self._asked += 1
 
 

@@ -31,10 +31,19 @@ def test_a_signal_lands_the_swarm_once(number, words):
         assert said == [words]
 
 
-def test_a_second_ctrl_c_ends_at_once():
+def test_a_second_ctrl_c_ends_between_two_ticks_and_tears_no_record():
     with Operator(str) as operator:
         press(signal.SIGINT)
         assert operator.events() == (LAND,)
+        press(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            operator.events()
+
+
+def test_a_third_ends_wherever_it_is():
+    with Operator(str):
+        press(signal.SIGINT)
+        press(signal.SIGINT)
         with pytest.raises(KeyboardInterrupt):
             press(signal.SIGINT)
 
@@ -56,8 +65,9 @@ def test_ctrl_c_after_other_signals_is_the_first_of_its_kind():
         press(signal.SIGHUP)
         press(signal.SIGINT)
         assert operator.events() == (LAND,)
+        press(signal.SIGINT)
         with pytest.raises(KeyboardInterrupt):
-            press(signal.SIGINT)
+            operator.events()
 
 
 def test_a_signal_that_comes_while_the_last_is_handed_out_is_not_lost():
