@@ -332,8 +332,7 @@ class Flight:
         row = int(np.argmax(missed))
         mute, altitude_m = bool(state.hands.mute[row]), self.scenario.swarm.altitude_m
         how = losses.how(swarm, row, silent=bool(silent[row]), mute=mute, altitude_m=altitude_m)
-        when = f"{self._mission_s(state):.1f} s into the mission"
-        return replace(state, problem=f"vehicle {swarm.ids[row]} {how} {when}")
+        return replace(state, problem=f"vehicle {swarm.ids[row]} {how} {state.when(self._period_s)}")
 
     def _overview(self, state: FlightState, swarm: Swarm) -> Diagnosis:
         """What every phase has to say."""
@@ -353,7 +352,7 @@ class Flight:
         )
 
     def _mission_s(self, state: FlightState) -> float:
-        return math.nan if state.mission_tick is None else (state.tick - state.mission_tick) * self._period_s
+        return state.mission_s(self._period_s)
 
     def _run_up_m(self, ticks: int) -> float:
         if self._run_up_ticks == 0:

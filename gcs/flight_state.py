@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -99,6 +100,16 @@ class FlightState:
     def over(self) -> Phase:
         """The phase in which a flight that cannot go on ends: whoever is armed on the ground is not ours to land."""
         return Phase.DONE if self.phase is Phase.JOIN else Phase.LAND
+
+    def mission_s(self, period_s: float) -> float:
+        """Since mission start; NaN before."""
+        return math.nan if self.mission_tick is None else (self.tick - self.mission_tick) * period_s
+
+    def when(self, period_s: float) -> str:
+        """For a sentence on what happened at this tick."""
+        if self.phase is not Phase.MISSION or self.mission_tick is None:
+            return f"while {self.phase.value}"
+        return f"{self.mission_s(period_s):.1f} s into the mission"
 
     def lateness_ns(self, now_ns: int, period_ns: int) -> int:
         """How far this tick is behind its deadline, reckoned from the first."""

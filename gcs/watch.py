@@ -168,6 +168,4 @@ class Watch:
         return np.asarray(np.nan_to_num(np.maximum(beyond, above), nan=0.0, neginf=0.0))
 
     def _when(self, state: FlightState) -> str:
-        if state.phase is not Phase.MISSION or state.mission_tick is None:
-            return f"while {state.phase.value}"
-        return f"{(state.tick - state.mission_tick) * self._scenario.time.period_s:.1f} s into the mission"
+        return state.when(self._scenario.time.period_s)
