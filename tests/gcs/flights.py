@@ -45,11 +45,28 @@ _scratch = tempfile.TemporaryDirectory(prefix="trustr-flights-")
 atexit.register(_scratch.cleanup)
 
 
-class Counting:
-    """A link that keeps every frame that passes through it, whichever way."""
+class Beside:
+    """A link that hands everything to another; those below differ from it in a thing or two."""
 
     def __init__(self, link):
         self._link = link
+
+    def receive(self):
+        return self._link.receive()
+
+    def send(self, system, frame):
+        self._link.send(system, frame)
+
+    @property
+    def rejected(self):
+        return self._link.rejected
+
+
+class Counting(Beside):
+    """A link that keeps every frame that passes through it, whichever way."""
+
+    def __init__(self, link):
+        super().__init__(link)
         self.received, self.sent = [], []
 
     def receive(self):
@@ -61,16 +78,13 @@ class Counting:
         self.sent.append((system, frame))
         self._link.send(system, frame)
 
-    @property
-    def rejected(self):
-        return self._link.rejected
 
-
-class Severed:
+class Severed(Beside):
     """A link that loses one vehicle, both ways, so many seconds after it was made, and may find it again."""
 
     def __init__(self, link, clock, *, system, from_s, to_s=math.inf):
-        self._link, self._clock, self._system = link, clock, system
+        super().__init__(link)
+        self._clock, self._system = clock, system
         self._from_ns, self._to_ns = clock.now() + from_s * 1e9, clock.now() + to_s * 1e9
 
     def receive(self):
@@ -79,10 +93,6 @@ class Severed:
     def send(self, system, frame):
         if not self._lost(system, self._clock.now()):
             self._link.send(system, frame)
-
-    @property
-    def rejected(self):
-        return self._link.rejected
 
     def _lost(self, system, time_ns):
         return system == self._system and self._from_ns <= time_ns < self._to_ns
@@ -95,11 +105,12 @@ def mode_command(autopilot, mode):
     return PX4_MODES[mode].main, PX4_MODES[mode].sub
 
 
-class OtherStation:
+class OtherStation(Beside):
     """A link beside which another ground station changes one vehicle's mode, so many seconds after it was made."""
 
     def __init__(self, link, clock, *, system, mode, at_s):
-        self._link, self._clock, self._system, self._mode = link, clock, system, mode
+        super().__init__(link)
+        self._clock, self._system, self._mode = clock, system, mode
         self._at_ns = clock.now() + round(at_s * 1e9)
         self._said = False
 
@@ -112,14 +123,7 @@ class OtherStation:
                 self._system, 1, dialect.MAV_CMD_DO_SET_MODE, 0, 1, main, sub, 0, 0, 0, 0
             )
             self._link.send(self._system, message.pack(words))
-        return self._link.receive()
-
-    def send(self, system, frame):
-        self._link.send(system, frame)
-
-    @property
-    def rejected(self):
-        return self._link.rejected
+        return super().receive()
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import orjson
 import pytest
-from flights import SHORT, Saying, failing, scratch
+from flights import SHORT, Beside, Saying, failing, scratch
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from gcs import session
@@ -202,24 +202,18 @@ def test_without_a_clock_they_are_told_all_the_same():
     assert len(wire.sent) == 2 * ROUNDS
 
 
-class Deaf:
+class Deaf(Beside):
     """A link that fails to be read from one call on."""
 
     def __init__(self, link, after):
-        self._link, self._left = link, after
+        super().__init__(link)
+        self._left = after
 
     def receive(self):
         self._left -= 1
         if self._left < 0:
             raise defect()
-        return self._link.receive()
-
-    def send(self, system, frame):
-        self._link.send(system, frame)
-
-    @property
-    def rejected(self):
-        return self._link.rejected
+        return super().receive()
 
 
 def test_a_link_that_cannot_be_read_any_more_still_carries_the_landing():
