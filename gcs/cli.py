@@ -22,6 +22,7 @@ from gcs.choices import (
     check_speed,
     checked_ids,
 )
+from gcs.cli_recordings import compare, log, replay, report, video
 from gcs.guard import BAD_INPUT, DONE, INTERRUPTED, NOT_DONE, guarded
 from gcs.options import AsJson, LinkTexts, Out, ScenarioName, SigningKey, Vehicles
 from gcs.supervision import NOBODY, Supervision
@@ -285,39 +286,8 @@ def identify(
     return guarded(command)
 
 
-@app.command
-def compare(
-    *recordings: Annotated[Path, Parameter(name="RECORDING", help="run.mcap files, or the folders they are in.")],
-    out: Annotated[Path, Parameter(help="The picture.")] = Path("comparison.png"),
-) -> int:
-    """Put flights side by side: a table, and one picture on one scale."""
-
-    def command() -> int:
-        from gcs.compare import compare as side_by_side
-
-        side_by_side(recordings, picture=out, console=console.stdout())
-        return DONE
-
-    return guarded(command)
-
-
-@app.command
-def replay(
-    recording: Annotated[Path, Parameter(help="A run.mcap, or the folder it is in.")],
-    /,
-    *,
-    verify: Annotated[
-        bool, Parameter(negative=(), help="Decide again and compare; so far all that replay does.")
-    ] = True,
-) -> int:
-    """Decide a recorded flight again from its frames, and compare every frame it would send."""
-
-    def command() -> int:
-        from gcs.replay import verify as decide_again
-
-        return decide_again(recording, console=console.stdout()) if verify else DONE
-
-    return guarded(command)
+for command in (compare, replay, log, report, video):
+    app.command(command)
 
 
 def main(words: Sequence[str] | None = None) -> None:

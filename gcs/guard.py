@@ -26,6 +26,7 @@ def guarded(command: Callable[[], int]) -> int:
 def _exit_code(error: Exception) -> int | None:
     """None of a defect."""
     from gcs.compare import UnwritablePicture
+    from gcs.output import Unwritable
     from gcs.rates import LinkTooSlow
     from gcs.ratings import RatingsError
     from gcs.reach import Refused, Unanswered
@@ -48,6 +49,7 @@ def _exit_code(error: Exception) -> int | None:
         RatingsError,
         UnreadableRecording,
         UnwritablePicture,
+        Unwritable,
     )
     if isinstance(error, refusals):
         return BAD_INPUT

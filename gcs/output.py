@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime as dt
 import shutil
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from itertools import count as counted
 from pathlib import Path
 
@@ -13,6 +14,32 @@ from gcs.recording.writer import RecordingError
 from scenarios import Scenario
 
 PICTURE = "trajectory.png"
+
+
+class Unwritable(OSError):
+    """A file that a command cannot write, in one sentence."""
+
+
+@contextmanager
+def whole(path: Path, option: str = "--out") -> Iterator[Path]:
+    """A path beside this one to write to; when the block ends well it takes its place, whole or not at all.
+
+    Raises Unwritable.
+    """
+    unfinished = path.with_name(f".unfinished-{path.name}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield unfinished
+        unfinished.replace(path)
+    except OSError as error:
+        if isinstance(error, Unwritable) or error.errno is None:
+            raise
+        raise Unwritable(f"{option} {path}: cannot be written: {error.strerror or error}") from None
+    finally:
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
+
+
 A_VEHICLE_MINUTE, A_PAIR_MINUTE = 1_000_000, 20_000
 """Bytes of a recording, at most: frames of each vehicle, and what each thinks of each."""
 

@@ -166,6 +166,20 @@ class PoseTopic:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class LinkTopic:
+    """/link: how the vehicles were heard since each was first heard, once a second; live flights only."""
+
+    tick: int
+    received: Vector
+    """Frames of each autopilot, each counted once."""
+    lost: Vector
+    reordered: Vector
+    duplicated: Vector
+    rejected: dict[str, Any]
+    """Reason → how many frames of anybody were refused for it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class FaultTopic:
     """/truth/fault: a fault of the scenario begins or ends."""
 

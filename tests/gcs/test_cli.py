@@ -16,7 +16,7 @@ from flights import GCS, SHORT, recorded, start
 
 from gcs import flying
 from gcs.output import output_folder, room
-from gcs.replay import decide_again
+from gcs.replay.verify import decide_again
 
 CONTRACT = {
     "scenario", "controller", "trust", "severity", "seed", "heading_error_deg", "distance_to_target_m",

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from gcs.events import LAND
 from gcs.recording.reader import read, ticks
-from gcs.replay import decide_again
+from gcs.replay.verify import decide_again
 from wire.frames import Framer, decode
 
 HOST = "127.0.0.1"

@@ -18,7 +18,7 @@ from gcs.inlet import HOST, Inlet
 from gcs.lockstep import Lockstep
 from gcs.operator import Operator
 from gcs.ratings import RatingsError, parse, written
-from gcs.replay import decide_again
+from gcs.replay.verify import decide_again
 from gcs.session import flown
 from scenarios import load
 

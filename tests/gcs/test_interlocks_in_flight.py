@@ -12,7 +12,7 @@ from gcs.events import HOLD, LAND, kill
 from gcs.flight import Flight
 from gcs.lockstep import Lockstep
 from gcs.loop import fly
-from gcs.replay import decide_again
+from gcs.replay.verify import decide_again
 from scenarios import load
 
 AUTOPILOTS = ("px4", "ardupilot")

@@ -20,7 +20,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from gcs.link_quality import LinkQuality
 from gcs.live import Live
 from gcs.recording.reader import read
-from gcs.replay import decide_again
+from gcs.replay.verify import decide_again
 from wire.connection import Connection, ConnectionRefused
 from wire.frames import Sender
 

@@ -9,7 +9,7 @@ from flights import SHORT, column, fly_and_record, recorded, rewritten, told
 from gcs.beliefs import UNTOLD
 from gcs.events import Rating
 from gcs.ratings import schedule
-from gcs.replay import decide_again
+from gcs.replay.verify import decide_again
 from scenarios import load
 
 RATINGS, FUSED = 'trust.source="ratings"', 'trust.source="fused"'

@@ -9,7 +9,7 @@ from flights import SHORT, failing, fly_and_record, messages, recorded, rewritte
 from rich.console import Console
 
 from gcs.recording.reader import UnreadableRecording, ticks
-from gcs.replay import decide_again, verify
+from gcs.replay.verify import decide_again, verify
 from wire.frames import Framer, Sender
 from wire.payloads import LOCAL_POSITION_NED, pack_local_position, unpack_local_position
 

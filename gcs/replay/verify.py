@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gcs.choices import AS_IT_IS, Choices
 from gcs.events import Event
 from gcs.flight import Flight
 from gcs.loop import fly
@@ -98,7 +99,7 @@ def decide_again(path: Path) -> Verification:
     return Verification(len(pages), setpoints, difference)
 
 
-def verify(path: Path, *, console: Any) -> int:
+def verify(path: Path, *, choices: Choices = AS_IT_IS, as_json: bool = False, console: Any) -> int:
     """Say what deciding again came to; 0 where nothing differs, else 3."""
     result = decide_again(path)
     if result.difference is None:

@@ -1,0 +1,1 @@
+"""Recorded flights again: decided anew and compared, or played back by time."""
