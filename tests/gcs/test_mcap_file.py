@@ -1,0 +1,246 @@
+"""The file as we write it, held to the one that the mcap library writes, and to a disk that takes no more."""
+
+import hashlib
+import io
+import resource
+import signal
+from pathlib import Path
+
+import pytest
+from flights import scratch
+from hypothesis import given
+from hypothesis import strategies as st
+from mcap.exceptions import EndOfFile
+from mcap.reader import SeekingReader
+from mcap.records import Chunk, Message, SummaryOffset
+from mcap.stream_reader import StreamReader
+from mcap.writer import CompressionType, Writer
+
+from gcs.recording.mcap_file import McapFile
+
+TOPICS = ("/a", "/b", "/ü")
+MESSAGES = st.tuples(st.sampled_from(range(len(TOPICS))), st.integers(0, 2**63), st.binary(max_size=40))
+STEPS = st.lists(st.one_of(MESSAGES, st.sampled_from(["flush", "attach", "metadata"])), max_size=40)
+
+
+class Library:
+    """The mcap library behind the same methods."""
+
+    def __init__(self, path):
+        self._stream = path.open("wb")
+        self._writer = Writer(self._stream, compression=CompressionType.LZ4)
+        self._writer.start(library="trustr")
+        self.schema, self.channel = self._writer.register_schema, self._writer.register_channel
+        self.metadata, self.flush = self._writer.add_metadata, self._writer.flush
+
+    def add(self, channel, time_ns, data):
+        self._writer.add_message(channel, time_ns, data, time_ns)
+
+    def attach(self, time_ns, name, media_type, data):
+        self._writer.add_attachment(time_ns, time_ns, name, media_type, data)
+
+    def finish(self):
+        self._writer.finish()
+        self._stream.close()
+
+
+def written(file, steps):
+    """The same into either; topics are defined when they are first spoken of."""
+    schema, channels = file.schema("S", "jsonschema", b"{}"), {}
+    for step in steps:
+        if step == "flush":
+            file.flush()
+        elif step == "attach":
+            file.attach(7, "scenario.json", "application/json", b"{}")
+        elif step == "metadata":
+            file.metadata("trustr", {"seed": "1", "ünicode": "✓"})
+        else:
+            topic, time_ns, data = step
+            if topic not in channels:
+                channels[topic] = file.channel(TOPICS[topic], "json", schema if topic else 0)
+            file.add(channels[topic], time_ns, data)
+    file.finish()
+
+
+@pytest.fixture(scope="module")
+def paths():
+    folder = scratch()
+    return folder / "ours.mcap", folder / "theirs.mcap"
+
+
+def both(paths, steps):
+    ours, theirs = paths
+    written(McapFile(ours), steps)
+    written(Library(theirs), steps)
+    return ours.read_bytes(), theirs.read_bytes()
+
+
+def reader(data):
+    return SeekingReader(io.BytesIO(data), validate_crcs=True)
+
+
+def footer(data):
+    *_, last = StreamReader(io.BytesIO(data), validate_crcs=True).records
+    return last
+
+
+@given(STEPS)
+def test_messages_chunks_and_their_indexes_are_the_librarys_to_the_byte(paths, steps):
+    ours, theirs = both(paths, steps)
+    assert ours[: footer(ours).summary_start] == theirs[: footer(theirs).summary_start]
+
+
+@given(STEPS)
+def test_readers_find_in_its_summary_what_they_find_in_the_librarys(paths, steps):
+    ours, theirs = (reader(data).get_summary() for data in both(paths, steps))
+    for group in ("statistics", "schemas", "channels", "chunk_indexes", "attachment_indexes", "metadata_indexes"):
+        assert getattr(ours, group) == getattr(theirs, group)
+
+
+@given(STEPS)
+def test_readers_that_seek_find_by_it_what_they_find_by_the_librarys(paths, steps):
+    ours, theirs = both(paths, steps)
+    for options in ({}, {"reverse": True}, {"topics": ["/a"]}, {"starting_at": 2**61, "ending_before": 2**62}):
+        assert list(reader(ours).iter_messages(**options)) == list(reader(theirs).iter_messages(**options))
+    assert list(reader(ours).iter_attachments()) == list(reader(theirs).iter_attachments())
+    assert list(reader(ours).iter_metadata()) == list(reader(theirs).iter_metadata())
+
+
+@given(STEPS)
+def test_its_footer_says_where_each_part_of_the_summary_is(paths, steps):
+    ours, _ = both(paths, steps)
+    found = footer(ours)
+    summary = StreamReader(io.BytesIO(ours[found.summary_start :]), skip_magic=True)
+    offsets = [record for record in summary.records if isinstance(record, SummaryOffset)]
+    for offset in offsets:
+        assert ours[offset.group_start] == offset.group_opcode
+        assert offset.group_length > 0
+    assert sum(offset.group_length for offset in offsets) == found.summary_offset_start - found.summary_start
+
+
+def test_a_chunk_is_closed_before_it_is_much_larger_than_a_mebibyte(paths):
+    ours, theirs = both(paths, [(0, time, bytes(1000)) for time in range(2500)])
+    assert ours[: footer(ours).summary_start] == theirs[: footer(theirs).summary_start]
+    assert [1 << 20 <= chunk.uncompressed_size < (1 << 20) + 1100 for chunk in chunks(ours)] == [True, True, False]
+
+
+def chunks(data):
+    return [record for record in StreamReader(io.BytesIO(data), emit_chunks=True).records if isinstance(record, Chunk)]
+
+
+def test_what_was_flushed_has_left_the_process(paths):
+    path, _ = paths
+    with McapFile(path) as file:
+        channel = file.channel("/a", "json")
+        for time in range(5):
+            file.add(channel, time, b"%d" % time)
+            file.flush()
+            assert list(prefix(path.read_bytes())) == [b"%d" % before for before in range(time + 1)]
+
+
+def prefix(data):
+    """The messages of a file without an end; whatever is wrong but its missing end raises."""
+    try:
+        for record in StreamReader(io.BytesIO(data), validate_crcs=True).records:
+            if isinstance(record, Message):
+                yield record.data
+    except EndOfFile:
+        pass
+
+
+class Disk:
+    """A limit to the size of what this process writes, as of a disk that is full: a write may stop half way."""
+
+    def __init__(self, size):
+        self._size = size
+
+    def __enter__(self):
+        self._before = resource.getrlimit(resource.RLIMIT_FSIZE)
+        self._handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (self._size, self._before[1]))
+
+    def __exit__(self, *_error):
+        resource.setrlimit(resource.RLIMIT_FSIZE, self._before)
+        signal.signal(signal.SIGXFSZ, self._handler)
+
+
+def random(number):
+    return hashlib.sha512(b"%d" % number).digest()
+
+
+def file_of(path, count):
+    """Messages that do not compress, a chunk each."""
+    file = McapFile(path)
+    channel = file.channel("/a", "json")
+    for number in range(count):
+        file.add(channel, number, random(number))
+        file.flush()
+    return file, channel
+
+
+@pytest.mark.parametrize("room", [1, 9, 60, 150])
+def test_a_chunk_that_the_disk_took_half_of_is_cut_off_again(paths, room):
+    path, _ = paths
+    file, channel = file_of(path, 3)
+    before = path.read_bytes()
+    with Disk(len(before) + room):
+        file.add(channel, 4, random(4))
+        file.add(channel, 5, random(5))
+        with pytest.raises(OSError, match="File too large"):
+            file.flush()
+    assert path.read_bytes() == before
+    assert file.dropped == 2
+    file.close()
+    assert list(prefix(path.read_bytes())) == [random(number) for number in range(3)]
+
+
+def test_a_file_that_had_no_room_for_its_end_is_finished_when_there_is(paths):
+    path, _ = paths
+    file, _ = file_of(path, 3)
+    before = path.read_bytes()
+    for room in (3, 100, 400):
+        with Disk(len(before) + room), pytest.raises(OSError, match="File too large"):
+            file.finish()
+        assert path.read_bytes() == before
+    file.finish()
+    assert [message.data for _, _, message in reader(path.read_bytes()).iter_messages()] == [
+        random(number) for number in range(3)
+    ]
+    assert reader(path.read_bytes()).get_summary().statistics.message_count == 3
+
+
+def test_a_dropped_chunk_is_in_no_summary(paths):
+    path, _ = paths
+    file, channel = file_of(path, 2)
+    other = file.channel("/late", "json", file.schema("Late", "jsonschema", b"{}"))
+    file.add(channel, 10**9, random(8))
+    file.add(other, 10**9, random(9))
+    with Disk(path.stat().st_size + 20), pytest.raises(OSError, match="File too large"):
+        file.flush()
+    file.finish()
+    summary = reader(path.read_bytes()).get_summary()
+    assert summary.statistics.message_count == 2
+    assert (summary.statistics.message_start_time, summary.statistics.message_end_time) == (0, 1)
+    assert [channel.topic for channel in summary.channels.values()] == ["/a"]
+    assert summary.schemas == {}
+
+
+def test_a_place_that_takes_nothing_is_refused_at_once():
+    with pytest.raises(OSError, match="No space left on device"):
+        McapFile(Path("/dev/full"))
+
+
+def failing_behind_a_flush(path):
+    with McapFile(path) as file:
+        channel = file.channel("/a", "json")
+        file.add(channel, 1, b"kept")
+        file.flush()
+        file.add(channel, 2, b"not")
+        raise ZeroDivisionError
+
+
+def test_an_error_in_its_block_leaves_what_was_flushed_and_no_summary(paths):
+    path, _ = paths
+    with pytest.raises(ZeroDivisionError):
+        failing_behind_a_flush(path)
+    assert list(prefix(path.read_bytes())) == [b"kept"]
