@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 ROOMS = ("aircraft", "fdm", "gcs", "scenarios", "trustr", "wire")
 THIRD_PARTIES = {
-    "numpy", "scipy", "pydantic", "pymavlink", "fastcrc", "jsbsim", "mcap", "pymap3d", "cyclopts", "rich",
+    "numpy", "scipy", "pydantic", "pymavlink", "fastcrc", "jsbsim", "mcap", "lz4", "pymap3d", "cyclopts", "rich",
     "matplotlib", "mpl_toolkits", "joblib", "orjson", "distributed", "serial", "mcap_protobuf", "google",
     "foxglove_schemas_protobuf", "foxglove", "jinja2", "pyarrow", "imageio_ffmpeg",
 }  # fmt: skip
