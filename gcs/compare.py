@@ -13,7 +13,7 @@ from rich.text import Text
 from gcs.recording.reader import Flown, UnreadableRecording, located, read
 from gcs.scoring import Score, score
 from gcs.summary import trust_of
-from gcs.words import faults, robots
+from gcs.words import controller_name, faults, robots
 
 FORMATS = (".png", ".pdf", ".svg")
 
@@ -37,8 +37,6 @@ def compare(recordings: Sequence[Path], *, picture: Path, console: Any) -> None:
 
 
 def _table(flights: Sequence[Flown]) -> Table:
-    from gcs.picture import controller_name
-
     title = Text(flights[0].scenario.title, style="bold")
     table = Table(title=title, title_justify="left", box=box.SIMPLE)
     table.add_column("")
@@ -84,7 +82,7 @@ def _verdict(flight: Flown, result: Score | None) -> Text:
 
 
 def _draw(flights: Sequence[Flown], picture: Path) -> None:
-    from gcs.picture import Panel, controller_name, draw_side_by_side
+    from gcs.picture import Panel, draw_side_by_side
 
     panels = [
         Panel(controller_name(flight.scenario), flight.track, flight.scenario, flight.problem)

@@ -22,7 +22,7 @@ from gcs.mission import Plan, plan
 from gcs.scoring import DISTRUSTED, Score, score, scored_robots
 from gcs.summary import trust_of
 from gcs.track import Parts, Track
-from gcs.words import faults, robots
+from gcs.words import controller_name, faults, robots
 from scenarios import Scenario, healthy_robots, offsets_ne
 
 HEALTHY = ("#1f4e8c", "#2a7fba", "#3aa6a0", "#5b8def", "#6a7fb5", "#2c9c6a")
@@ -34,12 +34,6 @@ FAULT, AIR = "#fdeeee", "#ecf1f7"
 LABEL = {"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.75}
 DPI = 120
 mpl.rcParams["text.parse_math"] = False  # a title or a task may hold a dollar sign
-NAMES = {
-    "average": "Averaged update (eq. 1)",
-    "median": "Coordinate-wise median",
-    "wmsr-1": "W-MSR, F = 1",
-    "wmsr-2": "W-MSR, F = 2",
-}
 PANEL_WIDTH, TRUST_HEIGHT, FRAME_HEIGHT = 5.8, 1.6, 3.2
 """Inches: of a panel, of its trust, and of all titles, labels and the legend together."""
 TITLE = 64
@@ -83,16 +77,6 @@ def draw_side_by_side(panels: Sequence[Panel], path: Path, *, heading: str) -> N
     figure.legend(handles=legend, loc="outside lower center", ncols=4, frameon=False, fontsize=9, columnspacing=1.4)
     figure.savefig(path, dpi=DPI)
     plt.close(figure)
-
-
-def controller_name(scenario: Scenario) -> str:
-    """How a person calls this flight's controller."""
-    control = scenario.control
-    if control.rule in NAMES:
-        return NAMES[control.rule]
-    profile = "" if control.profile == "paper" else f", {control.profile} profile"
-    rule = {"trust-r": "Trust-R", "confidence-decay": "Confidence decay"}.get(control.rule, control.rule)
-    return f"{rule}, trust from {scenario.trust.source}{profile}"
 
 
 Flags = npt.NDArray[np.bool_]

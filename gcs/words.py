@@ -1,4 +1,4 @@
-"""A summary in words."""
+"""What was flown, what went wrong and how it ended, in words."""
 
 from __future__ import annotations
 
@@ -20,6 +20,23 @@ from scenarios import (
     StuckVelocity,
     WindFault,
 )
+
+CONTROLLERS = {
+    "average": "Averaged update (eq. 1)",
+    "median": "Coordinate-wise median",
+    "wmsr-1": "W-MSR, F = 1",
+    "wmsr-2": "W-MSR, F = 2",
+}
+
+
+def controller_name(scenario: Scenario) -> str:
+    """How a person calls this flight's controller."""
+    control = scenario.control
+    if control.rule in CONTROLLERS:
+        return CONTROLLERS[control.rule]
+    profile = "" if control.profile == "paper" else f", {control.profile} profile"
+    rule = {"trust-r": "Trust-R", "confidence-decay": "Confidence decay"}.get(control.rule, control.rule)
+    return f"{rule}, trust from {scenario.trust.source}{profile}"
 
 
 def faults(scenario: Scenario) -> list[str]:
