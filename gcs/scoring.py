@@ -92,12 +92,17 @@ def heading_error(start_ne: Array, end_ne: Array, wanted_ne: Array) -> float:
 
 def min_separation(position: Array) -> float:
     """Smallest 3-D distance [m] of any two airborne robots over (T, N, 3) positions; infinite where there are none."""
+    return float(separation(position).min())
+
+
+def separation(position: Array) -> Array:
+    """(T,) m between the closest two airborne robots of (T, N, 3) positions; infinite where there are none."""
     grounded = position[..., 2] < AIRBORNE
-    closest = math.inf
+    closest = np.full(len(position), np.inf)
     for first in range(position.shape[1] - 1):
         gap = np.linalg.norm(position[:, first + 1 :] - position[:, first, None], axis=-1)
         gap[grounded[:, first + 1 :] | grounded[:, first, None]] = np.inf
-        closest = min(closest, float(gap.min()))
+        closest = np.minimum(closest, gap.min(axis=1))
     return closest
 
 
