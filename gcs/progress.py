@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from itertools import chain
 from types import TracebackType
 
 import numpy as np
@@ -18,7 +18,7 @@ from rich.text import Text
 from gcs.flight import STALE_NS, Flight
 from gcs.flight_state import Phase
 from gcs.loop import Tick
-from gcs.telemetry import Flags
+from gcs.recording import sentences
 from gcs.track import Parts, parts_of
 from gcs.unblocked import Unblocked
 from wire.modes import mode_name
@@ -73,9 +73,11 @@ class Display:
             if answer.refused:
                 self._console.print(answer.words, highlight=False)
         parts = parts_of(tick) or self._at_first
-        for words in (*_news(self._parts, parts), *_in_other_hands(self._released, tick)):
+        released = tick.state.released
+        news = sentences.parts(self._parts, parts), sentences.hands(tick.swarm.ids, self._released, released)
+        for _, words in chain(*news):
             self._console.print(f"{_clock(tick, self._flight)}  {words}", highlight=False)
-        self._parts, self._released = parts, tick.state.released
+        self._parts, self._released = parts, released
         if self._live is None:
             if phase is not self._phase:
                 self._console.print(f"{_clock(tick, self._flight)}  {phase.value}", highlight=False)
@@ -154,26 +156,6 @@ def _part(system: int, parts: Parts, *, released: bool) -> Text:
     if system in parts.left_behind:
         return Text("left behind", style="yellow")
     return Text("leader" if system in parts.leaders else "follower")
-
-
-def _news(before: Parts, now: Parts) -> Iterator[str]:
-    """What changed in who leads and who was left behind."""
-    for old, new in zip(before.leaders, now.leaders, strict=True):
-        if old != new:
-            yield f"robot {new} leads in place of robot {old}"
-    for system in now.left_behind:
-        if system not in before.left_behind:
-            yield f"robot {system} is left behind"
-    for system in before.left_behind:
-        if system not in now.left_behind:
-            yield f"robot {system} is taken back"
-
-
-def _in_other_hands(before: Flags, tick: Tick) -> Iterator[str]:
-    """Vehicles that others took from us at this tick, and those that the operator took back."""
-    for row in np.flatnonzero(before != tick.state.released):
-        system, taken = tick.swarm.ids[row], tick.state.released[row]
-        yield f"vehicle {system} is not ours any more: nothing is sent to it" if taken else f"vehicle {system} is ours"
 
 
 def _clock(tick: Tick, flight: Flight) -> str:
