@@ -37,6 +37,12 @@ class SwarmFrame:
         ne[:, 1] = east_deg * self.metres_per_degree[1] - self.origin_ne[1]
         return ne
 
+    def to_geodetic(self, ne: Array) -> Array:
+        """(N, 2) latitude, longitude [degrees] of (N, 2) places [m] in the swarm's frame."""
+        places = (ne + self.origin_ne) / self.metres_per_degree + (self.latitude_deg, self.longitude_deg)
+        places[:, 1] = (places[:, 1] + 180.0) % 360.0 - 180.0
+        return np.asarray(places)
+
 
 def origin_of(
     latitude_deg: float, longitude_deg: float, altitude_m: float, position_ned: Sequence[float]
