@@ -59,16 +59,30 @@ class Choices:
     set_: Overrides = ()
 
     def scenario(self, name: str) -> Scenario:
-        """The scenario as chosen. Raises ScenarioError, RuleError and BadUsageError."""
-        from gcs.control import settings
-        from scenarios import MotorDegradation, load
+        """The scenario of this name, or in this file, as chosen. Raises ScenarioError, RuleError and BadUsageError."""
+        from scenarios import load
 
+        return self._with_its_faults(load(name, overrides=self._overrides))
+
+    def revised(self, scenario: Scenario, *, source: str) -> Scenario:
+        """A scenario that is at hand, as chosen; source: how errors call it. Raises as `scenario` does."""
+        from scenarios import revised
+
+        return self._with_its_faults(revised(scenario, source=source, overrides=self._overrides))
+
+    @property
+    def _overrides(self) -> list[str]:
         overrides = list(self.set_)
         if self.controller is not None:
             overrides.append(f'control.rule="{self.controller}"')
         if self.trust is not None:
             overrides.append(f'trust.source="{self.trust}"')
-        loaded = load(name, overrides=overrides)
+        return overrides
+
+    def _with_its_faults(self, loaded: Scenario) -> Scenario:
+        from gcs.control import settings
+        from scenarios import MotorDegradation
+
         settings(loaded)  # tries its rule, which may be anybody's, before anything is made or flown
         if self.no_fault:
             loaded = loaded.without_faults()

@@ -14,7 +14,7 @@ from scenarios.faults import (
     WindFault,
 )
 from scenarios.layout import healthy_robots, offsets_ne
-from scenarios.loading import ScenarioError, find, load, names, parse
+from scenarios.loading import ScenarioError, find, load, names, parse, revised
 from scenarios.models import Leg, Redirect, Scenario, direction
 
 __all__ = [
@@ -40,4 +40,5 @@ __all__ = [
     "names",
     "offsets_ne",
     "parse",
+    "revised",
 ]

@@ -63,6 +63,15 @@ def parse(text: str, *, source: str, overrides: Sequence[str] = ()) -> Scenario:
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ScenarioError(f"{source}: not valid TOML: {error}") from None
+    return _built(tables, source=source, overrides=overrides)
+
+
+def revised(scenario: Scenario, *, source: str, overrides: Sequence[str]) -> Scenario:
+    """The same scenario with these keys changed, as `load` changes those of a file. Raises ScenarioError."""
+    return _built(scenario.model_dump(mode="json"), source=source, overrides=overrides)
+
+
+def _built(tables: dict[str, Any], *, source: str, overrides: Sequence[str]) -> Scenario:
     for override in overrides:
         _override(tables, override)
     try:
