@@ -6,67 +6,43 @@ nothing was told.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import Enum
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from gcs import words
 from gcs.events import Rating
+from gcs.flight_state import Phase
+from gcs.mission import plan
+from gcs.recording import happenings as find
+from gcs.recording import sentences
+from gcs.recording.happenings import FaultSpan, Found, Happening, Kind
+from gcs.recording.heard import Heard, Told, column, held
+from gcs.recording.reader import (
+    CUT_SHORT,
+    Recording,
+    UnreadableRecording,
+    located,
+    opened,
+    parts_of,
+    points,
+    rating_of,
+)
+from gcs.recording.writer import METADATA
 from gcs.track import Parts, Track
 from scenarios import Scenario
+
+__all__ = ["FaultSpan", "Happening", "History", "Kind", "Links", "load"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 Integers = npt.NDArray[np.int64]
-
-
-class Kind(Enum):
-    """What a happening is about."""
-
-    PHASE = "phase"
-    DISTRUST = "distrust"
-    """A robot's trust fell below 0.5, or rose above it again."""
-    RATING = "rating"
-    ROLES = "roles"
-    """Who leads, and who is left behind."""
-    FAULT = "fault"
-    """The truth of a simulation, which no flight knew; never shown to participants of a study."""
-    LINK = "link"
-    """A vehicle fell silent, or is heard again."""
-    WORD = "word"
-    """Of the operator, or of an autopilot."""
-    PROBLEM = "problem"
-
-
-@dataclass(frozen=True, slots=True)
-class Happening:
-    """Something that one would want to jump to."""
-
-    time_ns: int
-    tick: int
-    """Row of the arrays."""
-    mission_s: float
-    """NaN outside the mission."""
-    kind: Kind
-    vehicle: int | None
-    """System id, if it is about one."""
-    words: str
-
-
-@dataclass(frozen=True, slots=True)
-class FaultSpan:
-    """While a fault acted, as the simulation told it."""
-
-    vehicle: int | None
-    """Who is blamed; None of what strikes everyone."""
-    kind: str
-    from_s: float
-    """Since mission start."""
-    to_s: float
-    """Infinite where it never ended."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,8 +125,150 @@ class History:
     links: Links | None
     track: Track | None
     """The mission up to its read-out, for its score."""
+    summary: Mapping[str, Any] | None
+    """What the run reported, as in summary.json; None where the recording ends before it."""
+    recovered: Mapping[str, str] | None
+    """What `gcs log recover` found, lost and added, where it made this recording."""
+    autopilot: Integers
+    """(N,) MAV_AUTOPILOT of the heartbeats; 0 where none came."""
+
+
+RECOVERED = "recovered"
+"""The metadata record that tells what `gcs log recover` found, lost and added."""
 
 
 def load(path: Path) -> History:
     """Read a recording, or the one in a run's folder. Raises UnreadableRecording."""
-    raise NotImplementedError(path)
+    path = located(path)
+    with opened(path) as recording:
+        heard = Heard.of(recording.messages, recording.scenario.swarm.count)
+        if not heard.times:
+            raise UnreadableRecording(f"{path}: holds no tick of a flight")
+        history = _history(path, recording, heard)
+        return replace(history, happenings=tuple(_happenings(history, heard)))
+
+
+def _history(path: Path, recording: Recording, heard: Heard) -> History:
+    """All but what is found in it."""
+    scenario, told = recording.scenario, heard.topics
+    ids = tuple(range(1, scenario.swarm.count + 1))
+    n, states = len(ids), [told[f"/uav/{system}/state"] for system in ids]
+    number = np.array(sorted(heard.times), np.int64)
+    turns = [told["/tick"][tick] for tick in number.tolist()]
+    mission, fleet, setpoint = told["/mission"], told["/swarm/state"], told["/setpoint"]
+    reported = column(fleet, "position_m", number, n, 3) * (1.0, 1.0, -1.0)
+    truth = column(told["/truth/pose"], "position_m", number, n, 3)
+    commanded = column(setpoint, "commanded", number, n) > 0.0
+    parts = tuple(map(parts_of, heard.events["/roles"]))
+    return History(
+        path=path,
+        scenario=scenario,
+        metadata=recording.metadata[METADATA],
+        problem=recording.problem,
+        ids=ids,
+        number=number,
+        time_ns=np.array([heard.times[tick] for tick in number.tolist()], np.int64),
+        lateness_s=np.array([turn["lateness_ns"] for turn in turns]) / 1e9,
+        frames=np.array([turn["frames"] for turn in turns], np.int64),
+        phase=tuple(turn["phase"] for turn in turns),
+        mission_s=column(mission, "mission_s", number),
+        task=tuple(mission[tick]["task"] if tick in mission else "" for tick in number.tolist()),
+        position=np.where(np.isnan(truth), reported, truth),
+        measured=not told["/truth/pose"],
+        reported=reported,
+        velocity_ned=column(fleet, "velocity_m_s", number, n, 3),
+        age_s=column(fleet, "age_s", number, n),
+        attitude_rpy=held(states, "attitude_rad", number, 3),
+        battery=held(states, "battery", number),
+        armed=held(states, "armed", number) > 0.0,
+        custom_mode=_integers(held(states, "custom_mode", number), 0),
+        asked_ned=column(setpoint, "asked", number, n, 3),
+        sent_ned=np.where(commanded[..., None], column(setpoint, "sent", number, n, 3), np.nan),
+        verdict=_integers(column(setpoint, "verdict", number, n), -1),
+        trust=column(told["/trust"], "trust", number, n),
+        weights=column(told["/weights"], "weights", number, n, n),
+        virtual_ne=_pair(mission, "north_m", "east_m", number),
+        virtual_velocity_ne=_pair(mission, "velocity_north_m_s", "velocity_east_m_s", number),
+        ratings=tuple(map(rating_of, heard.events["/ratings"])),
+        parts=parts,
+        faults=tuple(_spans(heard.events["/truth/fault"], scenario)),
+        happenings=(),
+        links=_links(told["/link"], heard.link_times),
+        track=Track.of(list(points(told)), read_out_s=plan(scenario).read_out_s, parts=parts),
+        summary=recording.summary,
+        recovered=recording.metadata.get(RECOVERED),
+        autopilot=heard.autopilot,
+    )
+
+
+def _pair(told: Told, north: str, east: str, number: Integers) -> Array:
+    return np.column_stack([column(told, north, number), column(told, east, number)])
+
+
+def _integers(values: Array, untold: int) -> Integers:
+    return np.nan_to_num(values, nan=untold).astype(np.int64)
+
+
+def _spans(told: Sequence[Mapping[str, Any]], scenario: Scenario) -> Iterator[FaultSpan]:
+    """Each fault from its begin to its end, in the order in which they began."""
+    names = list(zip((fault.model_dump() for fault in scenario.fault), words.faults(scenario), strict=True))
+    for at, begin in enumerate(told):
+        if not begin["active"]:
+            continue
+        definition = begin["definition"]
+        ends = (e["mission_s"] for e in told[at + 1 :] if e["definition"] == definition and not e["active"])
+        said = next((name for known, name in names if known == definition), begin["kind"].replace("_", " "))
+        blamed = None if definition.get("everyone") else begin["vehicle"]
+        yield FaultSpan(blamed, begin["kind"], begin["mission_s"], next(ends, math.inf), said)
+
+
+def _links(told: Told, times: Mapping[int, int]) -> Links | None:
+    if not told:
+        return None
+    ticks = sorted(told)
+    received, lost = (np.array([told[tick][key] for tick in ticks]).astype(np.int64) for key in ("received", "lost"))
+    return Links(np.array([times[tick] for tick in ticks], np.int64), received, lost)
+
+
+def _happenings(history: History, heard: Heard) -> Iterator[Happening]:
+    """All of them, in the order of time."""
+    mission_s, ids = history.mission_s, history.ids
+    found = chain(
+        find.phases(history.phase, history.task),
+        find.faults(history.faults, mission_s),
+        _ratings(heard, history.number),
+        _words(history, heard),
+        find.distrust(history.trust, ids),
+        find.roles(history.parts, mission_s),
+        find.silences(history.age_s, ids),
+        _problem(history),
+    )
+    for row, kind, vehicle, said in sorted(found, key=lambda one: one[0]):
+        yield Happening(int(history.time_ns[row]), row, float(mission_s[row]), kind, vehicle, said)
+
+
+def _ratings(heard: Heard, number: Integers) -> Iterator[Found]:
+    for content in heard.events["/ratings"]:
+        said = rating_of(content)
+        yield find.row_at(number, content["tick"]), Kind.RATING, said.vehicle, sentences.rating(said)
+
+
+def _words(history: History, heard: Heard) -> Iterator[Found]:
+    """Of the operator, and of autopilots."""
+    for row, tick in enumerate(history.number.tolist()):
+        for event in heard.topics["/tick"][tick]["events"]:
+            yield row, Kind.WORD, None, sentences.operator(event)
+    for time_ns, system, text in heard.spoken:
+        yield find.row_at(history.time_ns, time_ns), Kind.WORD, system, sentences.vehicle(system, text)
+
+
+def _problem(history: History) -> Iterator[Found]:
+    """Where the flight turned to its end because of it."""
+    if history.problem is not None:
+        last = len(history.phase) - 1
+        turned = (row for row, phase in enumerate(history.phase) if phase in ENDS)
+        yield last if history.problem == CUT_SHORT else next(turned, last), Kind.PROBLEM, None, history.problem
+
+
+ENDS = (Phase.HOLD.value, Phase.LAND.value, Phase.DONE.value)
+"""Phases in which a flight that cannot go on ends."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +21,7 @@ from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
 from gcs.mission import plan
 from gcs.recording.writer import METADATA, SCENARIO, SUMMARY
 from gcs.track import Parts, Point, Track
-from scenarios import Scenario
+from scenarios import Scenario, names
 from wire.frames import Frame, Framer
 
 RECORDING = "run.mcap"
@@ -36,6 +36,39 @@ Table = npt.NDArray[np.float64]
 
 class UnreadableRecording(ValueError):
     """A file that is no recording of ours, in one sentence."""
+
+
+class Message(NamedTuple):
+    """One message, as it was recorded."""
+
+    topic: str
+    encoding: str
+    """mavlink, json or protobuf."""
+    time_ns: int
+    """Since 1970: a frame's arrival or departure, else the tick's."""
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recording:
+    """An open recording."""
+
+    scenario: Scenario
+    metadata: Mapping[str, Mapping[str, str]]
+    """Record → its values."""
+    messages: Iterator[Message]
+    """All of them, once, in the file's order."""
+
+    @property
+    def summary(self) -> Mapping[str, Any] | None:
+        """What the run reported, as in summary.json; None where the recording ends before it."""
+        told: dict[str, Any] | None = orjson.loads(self.metadata[SUMMARY]["json"]) if SUMMARY in self.metadata else None
+        return told
+
+    @property
+    def problem(self) -> str | None:
+        """Why the flight could not be completed, or that the recording ends before it."""
+        return CUT_SHORT if self.summary is None else self.summary["problem"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,10 +87,15 @@ class Flown:
 class RecordedTick(NamedTuple):
     """One turn of the recorded loop."""
 
+    number: int
+    """Counted from 0; a damaged recording that was recovered may lack some."""
     time_ns: int
     received: list[Frame]
     sent: list[bytes]
     events: tuple[Event, ...]
+    """Ratings with the time since mission start at which they counted."""
+    whole: bool
+    """Whether every frame that it consumed is there."""
 
 
 def located(path: Path) -> Path:
@@ -65,20 +103,30 @@ def located(path: Path) -> Path:
     return path / RECORDING if path.is_dir() else path
 
 
-def read(path: Path) -> Flown:
-    """Scenario, metadata and mission of a recording. Raises UnreadableRecording."""
+def instead_of_scenario(name: str) -> Path | None:
+    """The recording that was named where a scenario may be; None if it is one. Scenarios that ship come first."""
+    path = located(Path(name))
+    return path if path.suffix == ".mcap" and name not in names() else None
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Recording]:
+    """A recording to be read. Whatever is wrong with it raises UnreadableRecording, while it is read too."""
     with _readable(path), path.open("rb") as stream:
         reader = SeekingReader(stream, validate_crcs=True, record_size_limit=RECORD_SIZE_LIMIT)
         scenario = next((a.data for a in reader.iter_attachments() if a.name == SCENARIO), None)
         metadata = {record.name: record.metadata for record in reader.iter_metadata()}
         if scenario is None or METADATA not in metadata:
             raise UnreadableRecording(f"{path}: an MCAP file, but no flight of ours: it holds no {SCENARIO}")
-        loaded = Scenario.model_validate_json(scenario)
-        points, parts = list(_points(reader)), list(_parts(reader))
-        problem = orjson.loads(metadata[SUMMARY]["json"])["problem"] if SUMMARY in metadata else CUT_SHORT
-    rated = metadata[METADATA].get("ratings", "") != ""
-    track = Track.of(points, read_out_s=plan(loaded).read_out_s, parts=parts)
-    return Flown(path, loaded, rated, problem, track)
+        yield Recording(Scenario.model_validate_json(scenario), metadata, _messages(stream))
+
+
+def _messages(stream: BinaryIO) -> Iterator[Message]:
+    """Chunk by chunk: the reader that seeks would hold all of them in memory."""
+    stream.seek(0)
+    reader = NonSeekingReader(stream, validate_crcs=True, record_size_limit=RECORD_SIZE_LIMIT)
+    for _schema, channel, message in reader.iter_messages(log_time_order=False):
+        yield Message(channel.topic, channel.message_encoding, message.log_time, message.data)
 
 
 @contextmanager
@@ -94,60 +142,81 @@ def _readable(path: Path) -> Iterator[None]:
         raise UnreadableRecording(f"{path}: its {SCENARIO} is no scenario of this version") from None
     except DAMAGE as error:
         said = " ".join(str(error).split()) or type(error).__name__
-        raise UnreadableRecording(f"{path}: torn, damaged or not an MCAP file: {said}") from None
+        raise UnreadableRecording(
+            f"{path}: torn, damaged or not an MCAP file: {said}; gcs log recover FILE rebuilds it"
+        ) from None
 
 
 CUT_SHORT = "the recording ends before the flight did"
 POINTS = ("/mission", "/trust", "/truth/pose", "/swarm/state")
 
 
-def _points(reader: Any) -> Iterator[Point]:
-    """The mission's ticks, in order; positions are telemetry where no truth was told."""
-    told: dict[str, dict[int, dict[str, Any]]] = {topic: {} for topic in POINTS}
-    for _schema, channel, message in reader.iter_messages(topics=POINTS):
-        content = orjson.loads(message.data)
-        told[channel.topic][content["tick"]] = content
+def read(path: Path) -> Flown:
+    """Scenario, metadata and mission of a recording. Raises UnreadableRecording."""
+    with opened(path) as recording:
+        told: dict[str, dict[int, dict[str, Any]]] = {topic: {} for topic in POINTS}
+        parts = list[Parts]()
+        for message in recording.messages:
+            if message.topic in told:
+                content = orjson.loads(message.data)
+                told[message.topic][content["tick"]] = content
+            elif message.topic == "/roles":
+                parts.append(parts_of(orjson.loads(message.data)))
+        scenario = recording.scenario
+        rated = recording.metadata[METADATA].get("ratings", "") != ""
+        track = Track.of(list(points(told)), read_out_s=plan(scenario).read_out_s, parts=parts)
+        return Flown(path, scenario, rated, recording.problem, track)
+
+
+def points(told: Mapping[str, Mapping[int, Mapping[str, Any]]]) -> Iterator[Point]:
+    """The mission's ticks, in order; positions are telemetry where no truth was told.
+
+    told: topic → tick → what it told. A tick of which a damaged recording lost a part is left out.
+    """
     mission, trust, pose, telemetry = (told[topic] for topic in POINTS)
-    for tick, there in sorted(mission.items()):
-        measured = tick not in pose
+    measured = not pose
+    places = telemetry if measured else pose
+    for tick in sorted(mission.keys() & trust.keys() & places.keys()):
+        position = np.array(places[tick]["position_m"], dtype=np.float64)
         yield Point(
-            time_s=there["mission_s"],
-            position=_upwards(telemetry[tick]["position_m"]) if measured else np.array(pose[tick]["position_m"]),
+            time_s=mission[tick]["mission_s"],
+            position=position * (1.0, 1.0, -1.0) if measured else position,
             trust=np.array(trust[tick]["trust"]),
-            virtual_ne=np.array([there["north_m"], there["east_m"]]),
+            virtual_ne=np.array([mission[tick]["north_m"], mission[tick]["east_m"]]),
             measured=measured,
         )
 
 
-def _parts(reader: Any) -> Iterator[Parts]:
-    for _schema, _channel, message in reader.iter_messages(topics="/roles"):
-        content = orjson.loads(message.data)
-        yield Parts(content["mission_s"], tuple(content["leaders"]), tuple(content["left_behind"]))
+def parts_of(content: Mapping[str, Any]) -> Parts:
+    """What /roles told."""
+    return Parts(content["mission_s"], tuple(content["leaders"]), tuple(content["left_behind"]))
 
 
-def _upwards(position_ned: list[list[float | None]]) -> npt.NDArray[np.float64]:
-    """North, east, down as north, east, height; null is NaN."""
-    return np.array(position_ned, dtype=np.float64) * (1.0, 1.0, -1.0)
+def rating_of(content: Mapping[str, Any]) -> Rating:
+    """What /ratings told, with the time at which it counted."""
+    whom = content["vehicle"]
+    return Rating(content["rater"], None if whom == "swarm" else whom, content["rating"], content["time_s"])
+
+
+SENT = f"/mavlink/{GROUND_SYSTEM}_{GROUND_COMPONENT}/raw"
+"""Topic of what the ground station sent."""
 
 
 def ticks(path: Path) -> Iterator[RecordedTick]:
     """The frames of a recording as the loop took and sent them, in the file's order. Raises UnreadableRecording."""
     framer, received, sent, said = Framer(), list[Frame](), list[bytes](), list[Rating]()
-    own = f"/mavlink/{GROUND_SYSTEM}_{GROUND_COMPONENT}/raw"
     with _readable(path), path.open("rb") as stream:
-        reader = NonSeekingReader(stream, validate_crcs=True, record_size_limit=RECORD_SIZE_LIMIT)
-        for _schema, channel, message in reader.iter_messages(log_time_order=False):
-            if channel.topic == own:
-                sent.append(message.data)
-            elif channel.message_encoding == "mavlink":
-                received += framer.frames(message.log_time, message.data)
-            elif channel.topic == "/ratings":
-                content = orjson.loads(message.data)
-                whom = content["vehicle"]
-                said.append(Rating(content["rater"], None if whom == "swarm" else whom, content["rating"]))
-            elif channel.topic == "/tick":
-                content = orjson.loads(message.data)
-                yield RecordedTick(message.log_time, received, sent, (*content["events"], *said))
+        for topic, encoding, time_ns, data in _messages(stream):
+            if topic == SENT:
+                sent.append(data)
+            elif encoding == "mavlink":
+                received += framer.frames(time_ns, data)
+            elif topic == "/ratings":
+                said.append(rating_of(orjson.loads(data)))
+            elif topic == "/tick":
+                content = orjson.loads(data)
+                whole = len(received) == content["frames"]
+                yield RecordedTick(content["number"], time_ns, received, sent, (*content["events"], *said), whole)
                 received, sent, said = [], [], []
 
 
@@ -161,13 +230,12 @@ def steered(path: Path) -> Iterator[SteeredTick]:
     """Every tick at which set-points flowed, in order. Raises UnreadableRecording."""
     setpoint: dict[str, Any] | None = None
     with _readable(path), path.open("rb") as stream:
-        reader = NonSeekingReader(stream, validate_crcs=True, record_size_limit=RECORD_SIZE_LIMIT)
-        for _schema, channel, message in reader.iter_messages(log_time_order=False):
-            if channel.topic == "/setpoint":
-                setpoint = orjson.loads(message.data)
-            elif channel.topic == "/swarm/state":
-                fleet = orjson.loads(message.data)
-            elif channel.topic == "/tick" and setpoint is not None:
+        for topic, _encoding, _time_ns, data in _messages(stream):
+            if topic == "/setpoint":
+                setpoint = orjson.loads(data)
+            elif topic == "/swarm/state":
+                fleet = orjson.loads(data)
+            elif topic == "/tick" and setpoint is not None:
                 sent, commanded = _table(setpoint["sent"]), np.array(setpoint["commanded"])
                 fresh = np.array(fleet["age_s"], dtype=np.float64) <= FRESH_S
                 yield (
