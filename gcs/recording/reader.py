@@ -112,7 +112,7 @@ def instead_of_scenario(name: str) -> Path | None:
 @contextmanager
 def opened(path: Path) -> Iterator[Recording]:
     """A recording to be read. Whatever is wrong with it raises UnreadableRecording, while it is read too."""
-    with _readable(path), path.open("rb") as stream:
+    with readable(path), path.open("rb") as stream:
         reader = SeekingReader(stream, validate_crcs=True, record_size_limit=RECORD_SIZE_LIMIT)
         scenario = next((a.data for a in reader.iter_attachments() if a.name == SCENARIO), None)
         metadata = {record.name: record.metadata for record in reader.iter_metadata()}
@@ -130,7 +130,7 @@ def _messages(stream: BinaryIO) -> Iterator[Message]:
 
 
 @contextmanager
-def _readable(path: Path) -> Iterator[None]:
+def readable(path: Path) -> Iterator[None]:
     """Whatever is wrong with the file becomes one sentence."""
     try:
         yield
@@ -205,7 +205,7 @@ SENT = f"/mavlink/{GROUND_SYSTEM}_{GROUND_COMPONENT}/raw"
 def ticks(path: Path) -> Iterator[RecordedTick]:
     """The frames of a recording as the loop took and sent them, in the file's order. Raises UnreadableRecording."""
     framer, received, sent, said = Framer(), list[Frame](), list[bytes](), list[Rating]()
-    with _readable(path), path.open("rb") as stream:
+    with readable(path), path.open("rb") as stream:
         for topic, encoding, time_ns, data in _messages(stream):
             if topic == SENT:
                 sent.append(data)
@@ -229,7 +229,7 @@ SteeredTick = tuple[int, Table, Table, Table]
 def steered(path: Path) -> Iterator[SteeredTick]:
     """Every tick at which set-points flowed, in order. Raises UnreadableRecording."""
     setpoint: dict[str, Any] | None = None
-    with _readable(path), path.open("rb") as stream:
+    with readable(path), path.open("rb") as stream:
         for topic, _encoding, _time_ns, data in _messages(stream):
             if topic == "/setpoint":
                 setpoint = orjson.loads(data)
