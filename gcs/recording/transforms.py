@@ -13,7 +13,7 @@ from gcs.loop import Tick
 Array = npt.NDArray[np.float64]
 
 SWARM = "swarm"
-"""The frame of the swarm: x east, y north, z up, from where the mission begins, at the height of the vehicles' homes."""
+"""The frame of the swarm: x east, y north, z up, from where the mission begins, at the vehicles' homes' height."""
 
 
 def body(system: int) -> str:

@@ -12,14 +12,20 @@ from typing import Any, NamedTuple
 
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
 from gcs.loop import Tick
 from gcs.recording.fixes import Fixes
+from gcs.recording.said import Sayings
+from gcs.recording.scene import Scene
 from gcs.recording.transforms import Transforms
 from scenarios import Scenario
 
 FIX_S = 1.0
 """Between two fixes of a vehicle: maps draw the way it came."""
+SCENE_S = 0.2
+"""Between two scenes: links lag behind vehicles by no more than these fly in that time."""
 
 
 class Drawn(NamedTuple):
@@ -40,9 +46,14 @@ class Viewers:
         self._fixes = Fixes(ids)
         self._fix_topics = [f"/uav/{system}/fix" for system in ids]
         self._fix_ticks = scenario.time.ticks(FIX_S)
+        self._scene = Scene(scenario)
+        self._scene_ticks = scenario.time.ticks(SCENE_S)
+        self._sayings = Sayings(scenario)
 
     def of(self, tick: Tick) -> Iterator[Drawn]:
         """Everything that this turn of the loop has for viewers; places only once the swarm's frame is known."""
+        for sentence in self._sayings.at(tick):
+            yield Drawn("/log", Log, sentence)
         frame = tick.state.frame
         if frame is None:
             return
@@ -50,3 +61,5 @@ class Viewers:
         if tick.number % self._fix_ticks == 0:
             for topic, fix in zip(self._fix_topics, self._fixes.at(tick, frame), strict=True):
                 yield Drawn(topic, LocationFix, fix)
+        if tick.number % self._scene_ticks == 0:
+            yield Drawn("/swarm/scene", SceneUpdate, self._scene.at(tick))
