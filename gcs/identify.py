@@ -10,9 +10,9 @@ import numpy as np
 import orjson
 
 from gcs.loop import Tick, fly
-from gcs.recording.reader import SteeredTick, UnreadableRecording, located, read, steered
+from gcs.recording.reader import SteeredTick, UnreadableRecording, instead_of_scenario, located, read, steered
 from gcs.trial import ToItsReadOut
-from scenarios import Scenario, ScenarioError, load, names
+from scenarios import Scenario, ScenarioError, load
 from trustr.identification import SETTLING_S, Identified, Sample, identify
 from trustr.network import Array
 from trustr.response import Response, mean_lag_s
@@ -23,8 +23,8 @@ SHORTEST_S = 2.0 * SETTLING_S
 
 def of_fleet(name: str, *, overrides: Sequence[str], seeds: int, console: Any) -> Identified:
     """Identify the vehicles of a recording, or of a scenario's name or file. Raises what either raises."""
-    path = located(Path(name))
-    if path.suffix == ".mcap" and name not in names():  # a folder may be called as a scenario is
+    path = instead_of_scenario(name)
+    if path is not None:
         if overrides:
             raise ScenarioError(f"--set {overrides[0]}: a recording has been flown; nothing of it can be changed")
         return of_recording(path)
