@@ -63,10 +63,14 @@ def replay(
     """
 
     def command() -> int:
-        if verify or choices != AS_IT_IS:
+        if verify:
             from gcs.replay.verify import verify as decide_again
 
             return decide_again(recording, choices=choices, as_json=json, console=console.stdout())
+        if choices != AS_IT_IS:
+            from gcs.replay.what_if import what_if
+
+            return what_if(recording, choices, as_json=json, console=console.stdout())
         from gcs.replay.command import Playing, play
 
         playing = Playing(

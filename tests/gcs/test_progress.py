@@ -16,7 +16,7 @@ from gcs.hands import killed
 from gcs.loop import fly
 from gcs.progress import MOST_ROWS, WAITING_S, Display
 from gcs.recording.reader import ticks
-from gcs.replay.verify import EndOfRecording, Recorded
+from gcs.replay.again import EndOfRecording, Recorded
 from scenarios import load
 
 

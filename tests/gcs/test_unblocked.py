@@ -22,7 +22,8 @@ from gcs.flight import Flight
 from gcs.loop import fly
 from gcs.progress import Display
 from gcs.recording.reader import ticks
-from gcs.replay.verify import Recorded, decide_again
+from gcs.replay.again import Recorded
+from gcs.replay.verify import decide_again
 from gcs.unblocked import MOST, PATIENCE_S, Unblocked, unblocked
 
 ROOM = 4096
