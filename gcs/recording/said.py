@@ -6,10 +6,9 @@ A message's name is what it is about (`happenings.Kind`), with the vehicle behin
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import chain
 
-import numpy as np
 from foxglove_schemas_protobuf.Log_pb2 import Log
 from google.protobuf.timestamp_pb2 import Timestamp
 
@@ -21,7 +20,7 @@ from gcs.recording.happenings import Kind
 from gcs.recording.transforms import body
 from gcs.scoring import DISTRUSTED
 from gcs.summary import trust_of
-from gcs.telemetry import NEVER, Flags
+from gcs.telemetry import NEVER
 from gcs.track import Parts, parts_of
 from scenarios import Scenario
 
@@ -35,7 +34,7 @@ class Sayings:
     """Remembers what was so at the last tick, and says what is another."""
 
     def __init__(self, scenario: Scenario) -> None:
-        nobody = np.zeros(scenario.swarm.count, bool)
+        nobody = [False] * scenario.swarm.count
         self._asks_for_trust = trust_of(scenario) is not None
         self._phase: Phase | None = None
         self._task = ""
@@ -45,11 +44,17 @@ class Sayings:
 
     def at(self, tick: Tick) -> Iterator[bytes]:
         """What there is to say of a tick, in the order in which it came about."""
-        time = Timestamp()
-        time.FromNanoseconds(tick.time_ns)
-        told = self._people(tick), self._vehicles(tick), self._trust(tick), self._roles(tick), self._flight(tick)
-        for kind, system, level, words in chain(*told):
+        seconds, nanoseconds = divmod(tick.time_ns, 1_000_000_000)
+        for kind, system, level, words in chain(
+            self._people(tick),
+            self._vehicles(tick),
+            self._silence(tick),
+            self._trust(tick),
+            self._roles(tick),
+            self._flight(tick),
+        ):
             name = kind.value if system is None else f"{kind.value}/{body(system)}"
+            time = Timestamp(seconds=seconds, nanos=nanoseconds)
             yield bytes(Log(timestamp=time, level=level, message=words, name=name).SerializeToString())
 
     def _people(self, tick: Tick) -> Iterator[Said]:
@@ -60,32 +65,29 @@ class Sayings:
             yield Kind.RATING, rating.vehicle, Log.INFO, sentences.rating(rating)
 
     def _vehicles(self, tick: Tick) -> Iterator[Said]:
-        swarm, released = tick.swarm, tick.state.released
+        swarm, released = tick.swarm, tick.state.released.tolist()
         for system, severity, text in swarm.words:
             yield Kind.WORD, system, SEVERITIES[min(severity, len(SEVERITIES) - 1)], sentences.vehicle(system, text)
         for answer in swarm.answers:
             if answer.refused:
                 yield Kind.WORD, answer.system, Log.WARNING, answer.words
-        silent = (swarm.position_ns != NEVER) & (tick.time_ns - swarm.position_ns > LOST_NS)
-        for row in _differing(silent, self._silent):
-            lost = bool(silent[row])
-            yield (
-                Kind.LINK,
-                swarm.ids[row],
-                Log.ERROR if lost else Log.INFO,
-                sentences.silence(swarm.ids[row], lost=lost),
-            )
         for system, words in sentences.hands(swarm.ids, self._released, released):
             yield Kind.LINK, system, Log.WARNING, words
-        self._silent, self._released = silent, released
+        self._released = released
+
+    def _silence(self, tick: Tick) -> Iterator[Said]:
+        swarm = tick.swarm
+        silent = ((swarm.position_ns != NEVER) & (tick.time_ns - swarm.position_ns > LOST_NS)).tolist()
+        for system, lost in _differing(swarm.ids, self._silent, silent):
+            yield Kind.LINK, system, Log.ERROR if lost else Log.INFO, sentences.silence(system, lost=lost)
+        self._silent = silent
 
     def _trust(self, tick: Tick) -> Iterator[Said]:
         """In the mission, where the rule asks for trust: elsewhere nothing follows from it."""
         if not self._asks_for_trust or tick.diagnosis.phase is not Phase.MISSION:
             return
-        distrusted = tick.diagnosis.trust < DISTRUSTED
-        for row in _differing(distrusted, self._distrusted):
-            fell, system = bool(distrusted[row]), tick.swarm.ids[row]
+        distrusted = (tick.diagnosis.trust < DISTRUSTED).tolist()
+        for system, fell in _differing(tick.swarm.ids, self._distrusted, distrusted):
             yield Kind.DISTRUST, system, Log.WARNING if fell else Log.INFO, sentences.distrust(system, fell=fell)
         self._distrusted = distrusted
 
@@ -109,6 +111,7 @@ class Sayings:
         self._phase, self._task, self._problem = diagnosis.phase, task, problem
 
 
-def _differing(now: Flags, before: Flags) -> list[int]:
-    rows: list[int] = np.flatnonzero(now != before).tolist()
-    return rows
+def _differing(ids: Iterable[int], before: list[bool], now: list[bool]) -> Iterator[tuple[int, bool]]:
+    """Of which vehicles (system id) it is not so any more, or so at last."""
+    if now != before:
+        yield from ((system, so) for system, was, so in zip(ids, before, now, strict=True) if so != was)

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-import numpy as np
+from collections.abc import Iterable, Iterator
 
 from gcs.events import Event, Rating
-from gcs.telemetry import Flags
 from gcs.track import Parts
 
 OPINIONS = {1: "complete distrust", 2: "distrust", 3: "neither distrust nor trust", 4: "trust", 5: "complete trust"}
@@ -34,11 +31,13 @@ def silence(system: int, *, lost: bool) -> str:
     return f"vehicle {system} is {'silent' if lost else 'heard again'}"
 
 
-def hands(ids: tuple[int, ...], before: Flags, now: Flags) -> Iterator[tuple[int, str]]:
-    """(N,) vehicles that others took from us, and those that the operator took back: system id and sentence."""
-    for row in np.flatnonzero(before != now).tolist():
-        taken = f"vehicle {ids[row]} is not ours any more: nothing is sent to it"
-        yield ids[row], taken if now[row] else f"vehicle {ids[row]} is ours"
+def hands(ids: Iterable[int], before: Iterable[bool], now: Iterable[bool]) -> Iterator[tuple[int, str]]:
+    """Vehicles that others took from us, and those that the operator took back: system id and sentence."""
+    for system, was, released in zip(ids, before, now, strict=True):
+        if released and not was:
+            yield system, f"vehicle {system} is not ours any more: nothing is sent to it"
+        elif was and not released:
+            yield system, f"vehicle {system} is ours"
 
 
 def rating(said: Rating) -> str:

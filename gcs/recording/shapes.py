@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +23,7 @@ from foxglove_schemas_protobuf.TextPrimitive_pb2 import TextPrimitive
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 
 from gcs.mission import Plan, Segment
+from gcs.recording.looks import Look
 from gcs.recording.transforms import SWARM, body
 
 Array = npt.NDArray[np.float64]
@@ -40,18 +40,6 @@ FADED = 0.35
 """Opacity of what is there no longer: a vehicle that is silent, the rest of a leg that a call cut short."""
 PATH, TARGET, LEADER = (0.55, 0.57, 0.60), (0.91, 0.64, 0.0), (0.11, 0.62, 0.55)
 """Red, green, blue: seen on black and on white."""
-
-
-class Look(NamedTuple):
-    """How one vehicle is to be drawn."""
-
-    colour: tuple[float, float, float]
-    """Red, green, blue."""
-    label: str
-    ringed: bool
-    """Left behind or distrusted."""
-    faded: bool
-    """Not heard."""
 
 
 def colour(rgb: tuple[float, float, float], opacity: float = 1.0) -> Color:

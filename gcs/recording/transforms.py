@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
 
 from gcs.loop import Tick
 
@@ -14,6 +15,11 @@ Array = npt.NDArray[np.float64]
 
 SWARM = "swarm"
 """The frame of the swarm: x east, y north, z up, from where the mission begins, at the vehicles' homes' height."""
+
+FORMATION = "formation"
+"""The frame that goes along with the mean of all vehicles, turned as the swarm is: what is drawn in it goes along."""
+GRAIN_M, GRAIN_TURN = 2.0**-10, 2.0**-20
+"""How fine places and turns are told: finer than telemetry, and numbers of few digits pack well."""
 
 
 def body(system: int) -> str:
@@ -23,8 +29,10 @@ def body(system: int) -> str:
 
 def position_enu(tick: Tick) -> Array:
     """(N, 3) m in the swarm's frame, by telemetry; NaN until that frame is known."""
-    north, east = tick.diagnosis.position_ne.T
-    return np.stack([east, north, -tick.swarm.position_ned[:, 2]], axis=-1)
+    enu = np.empty((len(tick.swarm.ids), 3))
+    enu[:, 1::-1] = tick.diagnosis.position_ne
+    enu[:, 2] = -tick.swarm.position_ned[:, 2]
+    return enu
 
 
 def enu_of_flu(attitude_rpy: Array) -> Array:
@@ -46,15 +54,17 @@ class Transforms:
 
     def __init__(self, ids: Sequence[int]) -> None:
         self._message = FrameTransforms()
-        for system in ids:
-            self._message.transforms.add(parent_frame_id=SWARM, child_frame_id=body(system))
+        for child in (*map(body, ids), FORMATION):
+            self._message.transforms.add(parent_frame_id=SWARM, child_frame_id=child, rotation=Quaternion(w=1.0))
         self._parts = [(one.timestamp, one.translation, one.rotation) for one in self._message.transforms]
         self._attitude_rpy: Array | None = None
 
     def at(self, tick: Tick) -> bytes:
         """Of all vehicles, once the swarm's frame is known. Whose attitude was not told is level and heads north."""
         seconds, nanoseconds = divmod(tick.time_ns, 1_000_000_000)
-        for (time, place, _), (east, north, up) in zip(self._parts, position_enu(tick).tolist(), strict=True):
+        position = position_enu(tick)
+        places = _grained(np.vstack([position, position.mean(axis=0)]), GRAIN_M)
+        for (time, place, _), (east, north, up) in zip(self._parts, places.tolist(), strict=True):
             time.seconds, time.nanos = seconds, nanoseconds
             place.x, place.y, place.z = east, north, up
         self._turn(tick.swarm.attitude_rpy)
@@ -65,6 +75,10 @@ class Transforms:
         if attitude_rpy is self._attitude_rpy:
             return
         self._attitude_rpy = attitude_rpy
-        quaternions = enu_of_flu(np.nan_to_num(attitude_rpy)).tolist()
-        for (_, _, rotation), (x, y, z, w) in zip(self._parts, quaternions, strict=True):
+        quaternions = _grained(enu_of_flu(np.nan_to_num(attitude_rpy)), GRAIN_TURN)
+        for (_, _, rotation), (x, y, z, w) in zip(self._parts[:-1], quaternions.tolist(), strict=True):
             rotation.x, rotation.y, rotation.z, rotation.w = x, y, z, w
+
+
+def _grained(values: Array, grain: float) -> Array:
+    return np.asarray(np.round(values / grain) * grain)

@@ -2,7 +2,7 @@
 
 `Viewers.of` yields finished bytes with the class that reads them: the recorder writes them as they are, and takes the
 schema of a topic's channel from the class. Viewers' frames are ENU and FLU (REP-103): "swarm" is where the mission
-begins, "uav_<id>" the body of a vehicle.
+begins, "uav_<id>" the body of a vehicle, "formation" goes along with the mean of all vehicles.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from scenarios import Scenario
 
 FIX_S = 1.0
 """Between two fixes of a vehicle: maps draw the way it came."""
-SCENE_S = 0.2
-"""Between two scenes: links lag behind vehicles by no more than these fly in that time."""
+SCENE_S = 0.5
+"""Between two scenes: what is in them moves smoothly all the same, with frames that /tf tells every tick."""
 
 
 class Drawn(NamedTuple):
