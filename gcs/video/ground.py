@@ -1,0 +1,71 @@
+"""What of the map never moves: a grid, the planned path, its targets; and for those who may know, names and scale."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.artist import Artist
+from matplotlib.path import Path
+
+from gcs.mission import Plan
+from gcs.video.glyphs import ring
+from gcs.video.ink import DARK, PALE, lines, shapes, words
+from gcs.video.view import View
+
+Array = npt.NDArray[np.float64]
+
+GRID_M = 5.0
+GRID, PATH, TARGET, TARGET_EDGE = "#e9eae5", "#9aa0a8", "#ffffff", "#5b626c"
+SCALE_M = 10.0
+TARGET_PX, DOT_PX = 11.0, 2.5
+PAST_THE_MIDDLE = 0.6
+"""Of the box: a target further right has its name on its left."""
+
+
+def ground(view: View, plan: Plan | None) -> Iterator[Artist]:
+    """Grid, path and targets."""
+    yield _grid(view)
+    if plan is None:
+        return
+    flown = [view.pixels([segment.start_ne, segment.end_ne]) for segment in plan.segments]
+    yield lines(flown, PATH, 2.0, linestyles=[(0, (5, 4))])
+    for segment in plan.segments:
+        if not np.allclose(segment.end_ne, segment.planned_end_ne):
+            yield lines([view.pixels([segment.end_ne, segment.planned_end_ne])], PATH, 1.2, linestyles=[(0, (1, 4))])
+    yield shapes([_target(view.pixels(s.planned_end_ne)) for s in plan.segments], TARGET, TARGET_EDGE, 2.0)
+
+
+def named(view: View, plan: Plan | None) -> Iterator[Artist]:
+    """What each target is, how long ten metres are, and where north is."""
+    box = view.box
+    for number, segment in enumerate(plan.segments if plan is not None else (), start=1):
+        right, up = view.pixels(segment.planned_end_ne)
+        to_the_left = right > box.left + PAST_THE_MIDDLE * (box.right - box.left)
+        beside, side = (-18.0, "right") if to_the_left else (18.0, "left")
+        yield words(right + beside, up + 8.0, f"target {number}", size=12, colour=PALE, ha=side)
+        yield words(right + beside, up - 8.0, segment.task, size=13, ha=side, weight="bold")
+    right, bottom = box.right - 26.0, box.bottom + 26.0
+    left = right - SCALE_M * view.scale
+    yield lines([[(left, bottom + 5), (left, bottom), (right, bottom), (right, bottom + 5)]], DARK, 2.0)
+    yield words(0.5 * (left + right), bottom + 9, f"{SCALE_M:g} m", size=12, ha="center")
+    top = box.top - 26.0
+    yield lines([[(right, top - 42), (right, top - 4)]], DARK, 2.0)
+    yield shapes([Path(np.array([(right, top), (right - 6, top - 14), (right + 6, top - 14)]))], DARK)
+    yield words(right, top - 58, "N", size=13, ha="center", weight="bold")
+
+
+def _grid(view: View) -> Artist:
+    south, west, north, east = view.edges_ne
+    norths, easts = (
+        np.arange(np.ceil(a / GRID_M), np.floor(b / GRID_M) + 1) * GRID_M for a, b in ((south, north), (west, east))
+    )
+    across = [view.pixels([(n, west), (n, east)]) for n in norths]
+    along = [view.pixels([(south, e), (north, e)]) for e in easts]
+    return lines([*across, *along], GRID, 1.0)
+
+
+def _target(middle: Array) -> Path:
+    """A ring with a dot."""
+    return Path.make_compound_path(ring(middle, TARGET_PX), ring(middle, DOT_PX))
