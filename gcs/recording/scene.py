@@ -27,7 +27,7 @@ TRAIL_NS, TRAIL_POINTS, TRAIL_PX = 1_000_000_000, 30, 2.0
 """Between two points of a vehicle's trail, how many it has, and how wide it is."""
 GRAIN = 64
 """Points of a trail are told to this fraction of a metre: numbers of few digits pack well."""
-LINK_PX, SEEN_PX = 24.0, 0.5
+LINK_PX, SEEN_PX = 16.0, 0.5
 """Width of a link of weight 1, and the narrowest that is drawn."""
 LEADER_M = 0.6
 """Across the virtual leader."""
@@ -110,27 +110,30 @@ class Scene:
             x, y, z = (np.array([east, north, self._height_m]) - centre).tolist()
             paint = colour(shapes.LEADER)
             self._leader.spheres.append(shapes.ball(LEADER_M, paint, x, y, z))
-            self._leader.texts.append(shapes.text("virtual leader", x, y, z - 1.0, paint))
+            self._leader.texts.append(shapes.text("virtual leader", x, y - LEADER_M, z - LEADER_M, paint))
 
     def _draw_links(self, beside: Array, tick: Tick) -> None:
-        """A line for each two of whom one heeds the other, as wide as the larger of both weights.
+        """From each robot half the way to each that heeds it, as wide as its weight: whom nobody heeds has none.
 
-        beside: (N, 3) m, where vehicles are from the middle of the formation.  It has the colour of the less trusted.
+        beside: (N, 3) m, where vehicles are from the middle of the formation.
         """
         del self._links.lines[:]
         decision = tick.diagnosis.decision
         if decision is None:
             return
-        weights = decision.graph.dense(decision.weights)
-        width = np.triu(LINK_PX * np.maximum(weights, weights.T), 1)
-        trust, places, at = tick.diagnosis.trust.tolist(), beside.tolist(), shapes.pose()
-        for one, other in np.argwhere(width >= SEEN_PX).tolist():
+        graph, width = decision.graph, LINK_PX * decision.weights
+        seen = (graph.sender != graph.receiver) & (width >= SEEN_PX)
+        begin = beside[graph.sender[seen]]
+        middle = 0.5 * (begin + beside[graph.receiver[seen]])
+        at, wide = shapes.pose(), width[seen].tolist()
+        links = zip(graph.sender[seen].tolist(), wide, np.hstack([begin, middle]).tolist(), strict=True)
+        for sender, thickness, (x, y, z, east, north, up) in links:
             line = self._links.lines.add(
                 type=LinePrimitive.LINE_LIST,
                 pose=at,
-                thickness=float(width[one, other]),
+                thickness=thickness,
                 scale_invariant=True,
-                color=self._colours[one if trust[one] < trust[other] else other],
+                color=self._colours[sender],
             )
-            for x, y, z in (places[one], places[other]):
-                line.points.add(x=x, y=y, z=z)
+            line.points.add(x=x, y=y, z=z)
+            line.points.add(x=east, y=north, z=up)

@@ -59,7 +59,7 @@ def vehicle(system: int, look: Look) -> SceneEntity:
                                 size=disc, bottom_scale=1.0, top_scale=1.0, color=paint) for c in corners]  # fmt: skip
     nose = ArrowPrimitive(pose=pose(), shaft_length=0.35, shaft_diameter=0.07, head_length=0.25, head_diameter=0.2,
                           color=paint)  # fmt: skip
-    label = text(look.label, 0.0, 0.0, 0.9, colour(look.colour))
+    label = text(look.label, -2.0 * ARM, 0.0, ARM, colour(look.colour))
     return SceneEntity(
         frame_id=body(system),
         id=body(system),
