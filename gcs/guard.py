@@ -30,8 +30,8 @@ def _exit_code(error: Exception) -> int | None:
     from gcs.rates import LinkTooSlow
     from gcs.ratings import RatingsError
     from gcs.reach import Refused, Unanswered
+    from gcs.recording.files import RecordingError
     from gcs.recording.reader import UnreadableRecording
-    from gcs.recording.writer import RecordingError
     from gcs.rules import RuleError
     from scenarios import ScenarioError
     from wire.connection import ConnectionRefused

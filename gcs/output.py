@@ -9,8 +9,8 @@ from contextlib import contextmanager, suppress
 from itertools import count as counted
 from pathlib import Path
 
+from gcs.recording.files import RecordingError
 from gcs.recording.reader import RECORDING
-from gcs.recording.writer import RecordingError
 from scenarios import Scenario
 
 PICTURE = "trajectory.png"

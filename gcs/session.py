@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import datetime as dt
-import platform
 import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import replace
-from importlib.metadata import version
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gcs import console
@@ -19,15 +17,34 @@ from gcs.flight_state import FlightState, left_behind
 from gcs.loop import Clock, Link, Record, fly
 from gcs.operator import Operator
 from gcs.output import PICTURE
+from gcs.recording.files import SUMMARY
+from gcs.recording.journal import Journal, Journaled
 from gcs.recording.reader import RECORDING
-from gcs.recording.writer import SUMMARY, Recorder, Tap
+from gcs.recording.writer import IN_LARGE_CHUNKS_NS, Recorder, Tap
 from gcs.scoring import min_separation, score
 from gcs.shielded import Shielded, in_words
 from gcs.summary import Reception, Summary, collision, severity_of, trust_of
 from gcs.track import Track, Tracker
 from gcs.truth import Truth
+from gcs.versions import installed
 from gcs.words import faults
 from scenarios import Scenario
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """How a flight is recorded."""
+
+    flush_ns: int = IN_LARGE_CHUNKS_NS
+    """How long anything may wait to be written."""
+    decodes: bool = False
+    """Whether MAVLink messages are written as JSON, beside their frames."""
+    journal: Journal | None = None
+    """Where frames that are sent are noted first."""
+
+
+AS_IN_RUN = Recording()
+"""As a flight is recorded that can be flown again."""
 
 
 def flown(
@@ -41,6 +58,7 @@ def flown(
     operator: Operator,
     watching: Callable[[Flight], Iterable[Record]],
     ratings: Sequence[Rating] | None = None,
+    recording: Recording = AS_IN_RUN,
     reception: Callable[[], Reception] = Reception,
     say: Callable[[str], None] = console.say,
 ) -> Summary:
@@ -55,10 +73,20 @@ def flown(
     flight = Flight(scenario, ratings=ratings)
     truth = Truth(flight.ids)
     tracker = Tracker(flight, truth)
+    if recording.journal is not None:
+        link = Journaled(link, clock, recording.journal)
     began = time.perf_counter()
-    start_ns = clock.now()
-    metadata = _metadata(name, seed, ratings)
-    recorder = Recorder(out / RECORDING, scenario, truth, start_ns=start_ns, metadata=metadata, say=say)
+    recorder = Recorder(
+        out / RECORDING,
+        scenario,
+        truth,
+        start_ns=clock.now(),
+        metadata=_metadata(name, seed, ratings),
+        flush_ns=recording.flush_ns,
+        decodes=recording.decodes,
+        reception=reception,
+        say=say,
+    )
     with recorder:
         last_resort = LastResort(link, clock, flight.ids, say)
         records: tuple[tuple[str, Record], ...] = (
@@ -80,13 +108,18 @@ def flown(
             )
         took_s = time.perf_counter() - began
         track = tracker.track
-        recording = (out / RECORDING).resolve()
-        summary = _summary(name, scenario, state, track, seed, took_s, recording, link.rejected, reception())
-        recorder.add_metadata(SUMMARY, {"json": summary.json().decode()})
-    problem = summary.problem or recorder.problem or next(filter(None, (record.problem for record in shielded)), None)
-    if problem is not None:
-        summary = replace(summary, problem=problem, passed=False)
-    return _written(summary, track, scenario, out)
+        path = (out / RECORDING).resolve()
+        summary = _summary(name, scenario, state, track, seed, took_s, path, link.rejected, reception())
+        journal = None if recording.journal is None else recording.journal.problem
+        others = (journal, *(record.problem for record in shielded))
+        recorder.add_metadata(SUMMARY, {"json": _with_problem(summary, recorder.problem, *others).json().decode()})
+    return _written(_with_problem(summary, recorder.problem, *others), track, scenario, out)
+
+
+def _with_problem(summary: Summary, *problems: str | None) -> Summary:
+    """The first there is; the flight's own comes before all others."""
+    problem = summary.problem or next(filter(None, problems), None)
+    return summary if problem is None else replace(summary, problem=problem, passed=False)
 
 
 def _written(summary: Summary, track: Track | None, scenario: Scenario, out: Path) -> Summary:
@@ -110,22 +143,13 @@ def _written(summary: Summary, track: Track | None, scenario: Scenario, out: Pat
 
 def _metadata(name: str, seed: int | None, ratings: Sequence[Rating] | None) -> dict[str, str]:
     """Versions, seed, who rates and wall time: outside the promise of same seed, same bytes."""
-    packages = ("trustr", "jsbsim", "pymavlink", "numpy", "mcap")
     return {
         "scenario": name,
         "seed": "" if seed is None else str(seed),
         "ratings": "" if ratings is None else "known beforehand" if ratings else "live",
         "started": dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
-        "python": platform.python_version(),
-        **{package: _version(package) for package in packages},
+        **installed(),
     }
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except ImportError:
-        return "absent"
 
 
 def _summary(
@@ -164,7 +188,7 @@ def _summary(
         faults=faults(scenario),
         swarm_heading_error_deg=None if result is None else result.swarm_heading_error_deg,
         rejected_frames=rejected_frames,
-        rejections=reception.rejections,
+        rejections=dict(reception.rejections),
         loss=reception.loss,
         problem=problem,
     )

@@ -18,17 +18,23 @@ from scenarios.models import RULES as ASKS_FOR_TRUST
 class Reception:
     """How the vehicles were heard; empty where the link does not tell."""
 
-    rejections: dict[str, int] = field(default_factory=dict)
-    loss: dict[str, float] = field(default_factory=dict)
+    rejections: Mapping[str, int] = field(default_factory=dict)
+    """Reason → how many frames were refused for it."""
+    quality: Mapping[int, LinkQuality] = field(default_factory=dict)
+    """System id → how well its autopilot is heard."""
 
     @staticmethod
     def of(rejections: Mapping[str, int], quality: Mapping[int, LinkQuality]) -> Reception:
         """As a live link tells."""
-        heard = ((system, quality[system].loss) for system in sorted(quality))
         return Reception(
-            {reason: count for reason, count in sorted(rejections.items()) if count},
-            {str(system): loss for system, loss in heard if loss is not None},
+            {reason: count for reason, count in sorted(rejections.items()) if count}, dict(sorted(quality.items()))
         )
+
+    @property
+    def loss(self) -> dict[str, float]:
+        """System id → share of its autopilot's frames that did not come, of those that the link could tell."""
+        shares = ((system, heard.loss) for system, heard in self.quality.items())
+        return {str(system): loss for system, loss in shares if loss is not None}
 
 
 @dataclass(frozen=True, slots=True)

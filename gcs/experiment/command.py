@@ -20,7 +20,7 @@ from gcs.experiment.terminal import show
 from gcs.experiment.workers import Cluster, Local, Workers, WorkersLost
 from gcs.guard import DONE, INTERRUPTED, NOT_DONE
 from gcs.output import output_folder
-from gcs.recording.writer import RecordingError
+from gcs.recording.files import RecordingError
 from scenarios import ScenarioError
 from scenarios.experiment import load_experiment
 

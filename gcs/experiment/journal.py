@@ -8,7 +8,7 @@ from pathlib import Path
 from types import TracebackType
 
 from gcs.experiment.run import RunResult
-from gcs.recording.writer import RecordingError
+from gcs.recording.files import RecordingError
 
 JOURNAL = "runs.jsonl"
 BEGINNING = b'{"key":"'

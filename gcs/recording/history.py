@@ -22,6 +22,7 @@ from gcs.flight_state import Phase
 from gcs.mission import plan
 from gcs.recording import happenings as find
 from gcs.recording import sentences
+from gcs.recording.files import METADATA
 from gcs.recording.happenings import FaultSpan, Found, Happening, Kind
 from gcs.recording.heard import Heard, Told, column, held
 from gcs.recording.reader import (
@@ -34,7 +35,6 @@ from gcs.recording.reader import (
     points,
     rating_of,
 )
-from gcs.recording.writer import METADATA
 from gcs.track import Parts, Track
 from scenarios import Scenario
 

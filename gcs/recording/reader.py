@@ -19,7 +19,7 @@ from pydantic import ValidationError
 from gcs.events import Event, Rating
 from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
 from gcs.mission import plan
-from gcs.recording.writer import METADATA, SCENARIO, SUMMARY
+from gcs.recording.files import METADATA, SCENARIO, SUMMARY
 from gcs.track import Parts, Point, Track
 from scenarios import Scenario, names
 from wire.frames import Frame, Framer

@@ -24,7 +24,7 @@ from gcs.lockstep import Lockstep
 from gcs.loop import fly
 from gcs.mission import plan
 from gcs.recording.reader import Flown, read
-from gcs.session import flown
+from gcs.session import AS_IN_RUN, flown
 from gcs.summary import Summary
 from scenarios import Scenario, load
 from wire.modes import ARDUCOPTER_MODES, PX4_MODES
@@ -166,6 +166,8 @@ def fly_and_record(
     watching=lambda _flight: (),
     ratings=None,
     autopilot="px4",
+    recording=AS_IN_RUN,
+    say=lambda _words: None,
 ):
     """The same, not shared. through: wraps (link, clock);  events: what an operator says at each tick."""
     scenario = load(name, overrides=overrides)
@@ -183,7 +185,8 @@ def fly_and_record(
         operator=operator,
         watching=watching,
         ratings=ratings,
-        say=lambda _words: None,
+        recording=recording,
+        say=say,
     )
     return Recorded(scenario, summary, folder, link)
 
