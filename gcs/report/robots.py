@@ -1,0 +1,82 @@
+"""Lines of a swarm over time: one a robot, or of a crowd a band, with those beside it that failed or were doubted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from gcs.report.axes import Frame
+from gcs.report.svg import Label, area, path
+from gcs.report.told import Rows, Told
+from gcs.words import robots
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawn:
+    """One chart of one flight."""
+
+    svg: str
+    """"" where there is nothing to draw."""
+    words: str
+    """What it shows, in figures."""
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """The same chart of every flight, on one scale."""
+
+    id_: str
+    title: str
+    look_for: str
+    """What to look for."""
+    legend: tuple[tuple[str, str], ...]
+    """How a thing is drawn, and what it is."""
+    charts: tuple[Drawn, ...]
+    """In the order of the flights."""
+
+
+def swarm(frame: Frame, told: Told, rows: Rows, values: Array) -> list[str]:
+    """Values (len(rows), N) of every robot over these rows; those that matter most on top."""
+    time = told.since_s[rows]
+    order = sorted(range(told.count), key=lambda row: ("healthy", "doubted", "failed").index(told.looks[row]))
+    crowd = [row for row in order if told.looks[row] == "healthy"] if told.crowded else []
+    drawn = _band(frame, told, rows, values[:, crowd]) if crowd else []
+    for row in order:
+        if row not in crowd:
+            drawn.append(line(frame, told, rows, values[:, row], f"robot {told.looks[row]}", title=robots([told.history.ids[row]])))
+    return drawn if time.size else []
+
+
+def line(frame: Frame, told: Told, rows: Rows, values: Array, class_: str, *, title: str = "") -> str:
+    """One line over these rows, broken where ticks are missing."""
+    time, drawn = _broken(told, rows, told.since_s[rows]), _broken(told, rows, values)
+    return path(frame.time(time), frame.value.within(drawn), class_, title)
+
+
+def names(told: Told, values: Array) -> list[Label]:
+    """Of the robots that failed or were doubted, at their last values. values: (T, N)."""
+    found = []
+    for row, look in enumerate(told.looks):
+        known = np.flatnonzero(np.isfinite(values[:, row]))
+        if look != "healthy" and known.size:
+            found.append(Label(float(values[known[-1], row]), str(told.history.ids[row]), look))
+    return found
+
+
+def _band(frame: Frame, told: Told, rows: Rows, values: Array) -> list[str]:
+    """From the least to the most of many robots, and their median."""
+    known = np.isfinite(values).any(axis=1)
+    least, middle, most = (np.full(len(values), np.nan) for _ in range(3))
+    least[known], most[known] = np.nanmin(values[known], axis=1), np.nanmax(values[known], axis=1)
+    middle[known] = np.nanmedian(values[known], axis=1)
+    time, low, high = (_broken(told, rows, part) for part in (told.since_s[rows], least, most))
+    band = area(frame.time(time), frame.value.within(low), frame.value.within(high), "band")
+    return [band, line(frame, told, rows, middle, "robot healthy", title="median of the healthy robots")]
+
+
+def _broken(told: Told, rows: Rows, values: Array) -> Array:
+    return np.insert(values, told.breaks(rows), np.nan)
