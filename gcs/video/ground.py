@@ -20,6 +20,8 @@ GRID_M = 5.0
 GRID, PATH, TARGET, TARGET_EDGE = "#e9eae5", "#9aa0a8", "#ffffff", "#5b626c"
 SCALE_M = 10.0
 TARGET_PX, DOT_PX = 11.0, 2.5
+BESIDE_PX = 64.0
+"""From a target to its name."""
 PAST_THE_MIDDLE = 0.6
 """Of the box: a target further right has its name on its left."""
 
@@ -39,21 +41,28 @@ def ground(view: View, plan: Plan | None) -> Iterator[Artist]:
 
 def named(view: View, plan: Plan | None) -> Iterator[Artist]:
     """What each target is, how long ten metres are, and where north is."""
-    box = view.box
-    for number, segment in enumerate(plan.segments if plan is not None else (), start=1):
-        right, up = view.pixels(segment.planned_end_ne)
-        to_the_left = right > box.left + PAST_THE_MIDDLE * (box.right - box.left)
-        beside, side = (-18.0, "right") if to_the_left else (18.0, "left")
-        yield words(right + beside, up + 8.0, f"target {number}", size=12, colour=PALE, ha=side)
-        yield words(right + beside, up - 8.0, segment.task, size=13, ha=side, weight="bold")
-    right, bottom = box.right - 26.0, box.bottom + 26.0
-    left = right - SCALE_M * view.scale
-    yield lines([[(left, bottom + 5), (left, bottom), (right, bottom), (right, bottom + 5)]], DARK, 2.0)
-    yield words(0.5 * (left + right), bottom + 9, f"{SCALE_M:g} m", size=12, ha="center")
-    top = box.top - 26.0
+    if plan is not None:
+        for number, segment in enumerate(plan.segments, start=1):
+            yield from _name(view, segment.planned_end_ne, number, segment.task)
+    right, top = view.box.right - 26.0, view.box.top - 24.0
     yield lines([[(right, top - 42), (right, top - 4)]], DARK, 2.0)
     yield shapes([Path(np.array([(right, top), (right - 6, top - 14), (right + 6, top - 14)]))], DARK)
     yield words(right, top - 58, "N", size=13, ha="center", weight="bold")
+    right, up = right - 34.0, top - 36.0
+    left = right - SCALE_M * view.scale
+    yield lines([[(left, up + 5), (left, up), (right, up), (right, up + 5)]], DARK, 2.0)
+    yield words(0.5 * (left + right), up + 9, f"{SCALE_M:g} m", size=12, ha="center")
+
+
+def _name(view: View, place_ne: Array, number: int, task: str) -> Iterator[Artist]:
+    """What a target is, beside the swarm that will stand on it."""
+    box = view.box
+    right, up = view.pixels(place_ne)
+    to_the_left = right > box.left + PAST_THE_MIDDLE * (box.right - box.left)
+    sign, side = (-1.0, "right") if to_the_left else (1.0, "left")
+    yield lines([[(right + sign * TARGET_PX, up), (right + sign * (BESIDE_PX - 6.0), up)]], TARGET_EDGE, 1.0)
+    yield words(right + sign * BESIDE_PX, up + 4.0, f"target {number}", size=12, colour=PALE, ha=side)
+    yield words(right + sign * BESIDE_PX, up - 12.0, task, size=13, ha=side, weight="bold")
 
 
 def _grid(view: View) -> Artist:

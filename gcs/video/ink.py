@@ -25,7 +25,13 @@ Colours = Any
 def lines(segments: Sequence[Any], colours: Colours, widths: Any, **style: Any) -> LineCollection:
     """One line of (P, 2) px for each of the segments."""
     return LineCollection(
-        segments, colors=colours, linewidths=widths, capstyle="round", transform=IdentityTransform(), **style
+        segments,
+        colors=colours,
+        linewidths=widths,
+        capstyle="butt",
+        joinstyle="round",
+        transform=IdentityTransform(),
+        **style,
     )
 
 

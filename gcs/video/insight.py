@@ -25,6 +25,8 @@ Flags = npt.NDArray[np.bool_]
 LINK_OPACITY, LINK_PX, LEAST_PX = 0.32, 14.0, 0.3
 """A link of weight 1 is so wide; thinner ones than the last are not drawn."""
 LABEL_PX, LEADER_PX, RING_PX = 12.0, 1.5, 2.2
+FURTHER = 1.3
+"""The ring of a faulty robot is outside that of a leader."""
 GHOST = "#22272e"
 
 
@@ -39,12 +41,8 @@ class Insight:
 
     def colours(self, tick: int) -> Array:
         """(N, 3): each robot's trust; where nobody asks for it, whether something is wrong with it."""
-        return trust_colour(self._rank(tick))
-
-    def _rank(self, tick: int) -> Array:
-        """(N,) 0 … 1: what the colours show."""
         trust = self._history.trust[tick] if self.trusting else np.where(self.faulty(tick), 0.0, 1.0)
-        return np.where(np.isnan(trust), 1.0, trust)
+        return trust_colour(np.where(np.isnan(trust), 1.0, trust))
 
     def faulty(self, tick: int) -> Flags:
         """(N,) whom a fault acts on."""
@@ -58,15 +56,15 @@ class Insight:
         return np.isin(self._history.ids, self._history.scenario.swarm.leaders if part is None else part.leaders)
 
     def links(self, time_s: float, tick: int) -> Iterator[Artist]:
-        """Between two of whom one heeds the other, as wide as the larger weight, in the colour of the less trusted."""
-        heed = np.nan_to_num(self._history.weights[tick])
-        width = LINK_PX * np.maximum(heed, heed.T)
-        one, other = np.nonzero(np.triu(width, k=1) >= LEAST_PX)
-        if one.size:
-            here, colours, rank = self._flock.middles(time_s), self.colours(tick), self._rank(tick)
-            paint = colours[np.where(rank[one] < rank[other], one, other)]
-            opaque = np.full((len(one), 1), LINK_OPACITY)
-            yield lines(list(np.stack([here[one], here[other]], axis=1)), np.hstack([paint, opaque]), width[one, other])
+        """Between neighbours: the half on a robot's side is as wide as the other heeds it."""
+        heeded = np.nan_to_num(self._history.weights[tick].T) * LINK_PX
+        np.fill_diagonal(heeded, 0.0)
+        whom, by = np.nonzero(heeded >= LEAST_PX)
+        if whom.size:
+            here = self._flock.middles(time_s)
+            halves = np.stack([here[whom], 0.5 * (here[whom] + here[by])], axis=1)
+            paint = np.column_stack([self.colours(tick)[whom], np.full(len(whom), LINK_OPACITY)])
+            yield lines(list(halves), paint, heeded[whom, by])
 
     def marks(self, time_s: float, tick: int) -> Iterator[Artist]:
         """Rings of leaders and of the faulty, numbers, and the virtual leader."""
@@ -74,11 +72,12 @@ class Insight:
         radius = 2.15 * self._flock.arm
         for among, colour, width, reach in (
             (self.leaders(tick), DARK, LEADER_PX, 1.0),
-            (self.faulty(tick), FAILED, RING_PX, 1.3),
+            (self.faulty(tick), FAILED, RING_PX, FURTHER),
         ):
             if among.any():
                 yield shapes([ring(middle, reach * radius) for middle in here[among]], "none", colour, width)
-        beside = here + np.array([radius + 1.0, -radius - 3.0])
+        outside = np.where(self.faulty(tick), FURTHER, 1.0)[:, None]
+        beside = here + outside * np.array([0.9 * radius, -0.9 * radius - 0.5 * LABEL_PX])
         yield shapes([Path(p.vertices + at, p.codes) for p, at in zip(self._labels, beside, strict=True)], DARK)
         ghost = self._history.virtual_ne[tick]
         if not math.isnan(ghost[0]):

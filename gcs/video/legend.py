@@ -36,7 +36,7 @@ def legend(insight: Insight) -> Iterator[Artist]:
         ("faulty, in truth", 0.0, shapes([ring(_at(left, 0.0), 7.0)], "none", FAILED, 2.2)),
         ("leads", 132.0, shapes([ring(_at(left, 132.0), 6.0)], "none", DARK, 1.5)),
         ("where the swarm should be", 204.0, shapes([cross(_at(left, 204.0))], "none", GHOST, 2.0)),
-        ("heeded neighbours", 424.0, lines([[_at(left, 400.0), _at(left, 424.0)]], link, 3.0)),
+        ("neighbours, as wide as each is heeded", 424.0, lines([[_at(left, 400.0), _at(left, 424.0)]], link, 3.0)),
     )
     for told, further, sign in signs:
         yield sign

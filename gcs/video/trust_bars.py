@@ -49,14 +49,14 @@ class TrustBars:
         """Heading, numbers and empty bars."""
         up = self._box.top - 14.0
         if not self._places:
-            yield words(self._box.left, up, "this rule asks for no trust", size=12, colour=PALE)
+            yield words(self._box.left, up, "this rule asks for no trust", colour=PALE)
             return
         count = len(self._history.ids)
         of_many = "" if count == len(self._places) else f": of {count} robots, those ever trusted least"
-        yield words(self._box.left, up, f"trust{of_many}", size=12, colour=PALE)
+        yield words(self._box.left, up, f"trust{of_many}", colour=PALE)
         for place in self._places:
             number = str(self._history.ids[place.row])
-            yield words(place.left - 8.0, place.bottom + 1.5, number, size=12, ha="right")
+            yield words(place.left - 8.0, place.bottom + 1.5, number, ha="right")
         yield boxes([(p.left, p.bottom, p.right, p.bottom + 12.0) for p in self._places], "#eff0ec")
 
     def show(self, tick: int) -> Iterator[Artist]:
@@ -71,7 +71,7 @@ class TrustBars:
         yield lines(marks, "#ffffff", 1.0)
         if self._columns <= 2:
             for place in self._places:
-                yield words(place.right + 6.0, place.bottom + 1.5, f"{trust[place.row]:.2f}", size=12, colour=DARK)
+                yield words(place.right + 6.0, place.bottom + 1.5, f"{trust[place.row]:.2f}", colour=DARK)
 
     def _placed(self, rows: list[int]) -> Iterator[Place]:
         width = (self._box.right - self._box.left + GAP_PX) / max(self._columns, 1) - GAP_PX
