@@ -24,7 +24,7 @@ from gcs.choices import (
 )
 from gcs.cli_recordings import compare, log, replay, report, video
 from gcs.guard import BAD_INPUT, DONE, INTERRUPTED, NOT_DONE, guarded
-from gcs.options import AsJson, LinkTexts, Out, ScenarioName, SigningKey, Vehicles
+from gcs.options import AsJson, Decodes, LinkTexts, Out, ScenarioName, SigningKey, Vehicles
 from gcs.supervision import NOBODY, Supervision
 from gcs.unblocked import unblocked
 
@@ -44,30 +44,35 @@ app = App(
 
 @app.command
 def run(
-    scenario: ScenarioName,
+    scenario: Annotated[
+        str, Parameter(help="A scenario's name or TOML file; or a run.mcap, or its folder, to be flown again.")
+    ],
     /,
     choices: Choices = AS_IT_IS,
     supervision: Supervision = NOBODY,
     *,
-    seed: Annotated[int, Parameter(help="Of noise, gusts and turbulence.")] = 1,
+    seed: Annotated[
+        int | None, Parameter(help="Of noise, gusts and turbulence; 1, or the recording's, if absent.")
+    ] = None,
     out: Out = None,
+    record_decoded: Decodes = False,
     json: AsJson = False,
 ) -> int:
-    """Fly a scenario in simulation, as fast as it goes, and record it."""
+    """Fly a scenario in simulation, as fast as it goes, and record it; or a recorded flight once more."""
 
     def command() -> int:
         try:
             from gcs.lockstep import Lockstep
         except ModuleNotFoundError as error:
             raise BadUsageError(f"run simulates, and needs {error.name}, which is not installed") from None
-        from gcs.flying import Request, flight
+        from gcs.flying import Request, Way, flight
+        from gcs.to_fly import to_fly
 
         check_seed(seed)
-        chosen = choices.scenario(scenario)
-        ratings = supervision.known(chosen, seed=seed)
-        world = Lockstep.of(chosen, seed=seed)
-        request = Request(scenario, supervision, seed=seed, out=out, json=json)
-        return flight(chosen, request, world, world, ratings)
+        ours = to_fly(scenario, choices, supervision, seed=seed, say=console.say)
+        world = Lockstep.of(ours.scenario, seed=ours.seed)
+        request = Request(ours.name, supervision, seed=ours.seed, out=out, json=json, decodes=record_decoded)
+        return flight(ours.scenario, request, world, world, ours.ratings, Way(said=ours.said))
 
     return guarded(command)
 
@@ -92,6 +97,7 @@ def fly(
     speed: Annotated[float, Parameter(help="The vehicles' seconds a second, as `fdm serve --speed`.")] = 1.0,
     seed: Annotated[int | None, Parameter(help="Of `fdm serve`, for the record.")] = None,
     out: Out = None,
+    record_decoded: Decodes = False,
     json: AsJson = False,
 ) -> int:
     """Fly a scenario with vehicles behind real links: `fdm serve`, PX4 or ArduPilot."""
@@ -102,7 +108,7 @@ def fly(
         check_seed(seed)
         check_speed(speed)
         hardware = Hardware(link, arm, yes, degrade, signing_key, speed)
-        request = Request(scenario, supervision, seed=seed, out=out, json=json)
+        request = Request(scenario, supervision, seed=seed, out=out, json=json, decodes=record_decoded)
         return live(choices.scenario(scenario), request, hardware)
 
     return guarded(command)

@@ -11,7 +11,7 @@ from gcs import console
 from gcs.choices import BadUsageError, confirmed
 from gcs.control_socket import ControlSocket
 from gcs.degrade import Degraded, degrading
-from gcs.events import Rating
+from gcs.events import Event, Rating
 from gcs.flight import Flight
 from gcs.guard import BAD_INPUT, DONE, INTERRUPTED, NOT_DONE
 from gcs.links import FLIES, LISTENS, opened, understood
@@ -21,12 +21,17 @@ from gcs.operator import Operator
 from gcs.output import PICTURE, make_room, output_folder, room
 from gcs.progress import Display
 from gcs.rates import positions_per_tick
-from gcs.session import flown
+from gcs.recording import files
+from gcs.recording.journal import Journal
+from gcs.recording.reader import RECORDING
+from gcs.recording.writer import IN_LARGE_CHUNKS_NS, PROMPTLY_NS
+from gcs.session import Recording, flown
 from gcs.summary import Reception, Summary
 from gcs.supervision import Supervision
 from gcs.words import verdict
 from scenarios import MotorDegradation, Scenario
 from wire.connection import Connection
+from wire.frames import Frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +44,8 @@ class Request:
     seed: int | None
     out: Path | None
     json: bool
+    decodes: bool
+    """Whether MAVLink messages are recorded as JSON, too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +86,27 @@ def live(scenario: Scenario, request: Request, hardware: Hardware) -> int:
         def reception() -> Reception:
             return Reception.of(vehicles.rejections, vehicles.quality)
 
-        return flight(scenario, request, link, vehicles, ratings, connections=connections, reception=reception)
+        way = Way(connections, reception=reception, flush_ns=PROMPTLY_NS, listens=vehicles.tell)
+        return flight(scenario, request, link, vehicles, ratings, way)
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """What differs between vehicles behind real links and those that we simulate, besides link and clock."""
+
+    connections: Sequence[Connection] = ()
+    """By which other commands may reach the flight."""
+    said: Callable[[], tuple[Event, ...]] = tuple
+    """Where none may, what is said instead, tick by tick."""
+    reception: Callable[[], Reception] = Reception
+    """Tells how the vehicles were heard."""
+    flush_ns: int = IN_LARGE_CHUNKS_NS
+    """How long anything may wait to be recorded."""
+    listens: Callable[[Callable[[Frame], None]], None] | None = None
+    """Hands a journal every frame as it arrives; None where the flight can be flown again, and needs none."""
+
+
+IN_LOCKSTEP = Way()
 
 
 def flight(
@@ -88,29 +115,28 @@ def flight(
     link: Link,
     clock: Clock,
     ratings: tuple[Rating, ...] | None,
-    *,
-    connections: Sequence[Connection] = (),
-    reception: Callable[[], Reception] = Reception,
+    way: Way = IN_LOCKSTEP,
 ) -> int:
-    """Fly, record, show and report. Exit code.
-
-    connections: by which other commands may reach the flight;  reception: tells how the vehicles were heard.
-    """
+    """Fly, record, show and report. Exit code."""
     with ExitStack() as stack:
         live_ratings = request.supervision.live(stack, scenario, console.say)
         folder = output_folder(request.out, request.name, needs=room(scenario))
         earlier = make_room(folder)
         if earlier is not None:
             console.say(f"an earlier recording is kept as {earlier}")
+        journal = None
+        if way.listens is not None:
+            journal = stack.enter_context(Journal(files.journal(folder / RECORDING), console.say))
+            way.listens(journal.arrived)
         screen = console.stderr()
         control = None
-        if connections:
+        if way.connections:
             ids = range(1, scenario.swarm.count + 1)
-            control = stack.enter_context(ControlSocket(connections, ids, console.say))
+            control = stack.enter_context(ControlSocket(way.connections, ids, console.say))
         operator = stack.enter_context(
             Operator(
                 lambda words: screen.print(words, highlight=False, markup=False),
-                words=tuple if control is None else control.take,
+                words=way.said if control is None else control.take,
                 ratings=live_ratings,
             )
         )
@@ -129,7 +155,8 @@ def flight(
             operator=operator,
             watching=watching,
             ratings=ratings,
-            reception=reception,
+            recording=Recording(way.flush_ns, request.decodes, journal),
+            reception=way.reception,
         )
     _report(summary, folder, json=request.json)
     if operator.interrupted:

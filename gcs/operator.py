@@ -28,7 +28,7 @@ class Operator:
         self,
         say: Callable[[str], None],
         *,
-        words: Callable[[], tuple[str, ...]] = tuple,
+        words: Callable[[], tuple[Event, ...]] = tuple,
         ratings: Callable[[], tuple[Rating, ...]] = tuple,
     ) -> None:
         """words, ratings: hand out what came since their last call; called once by each call of `events`."""

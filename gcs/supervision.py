@@ -31,7 +31,7 @@ class Supervision:
         if self.ratings is None and self.ratings_port is None:
             return None
         source = scenario.trust.source
-        if source not in ("ratings", "fused"):
+        if not takes_ratings(scenario):
             option = "--ratings" if self.ratings is not None else "--ratings-port"
             raise RatingsError(f"{option}: trust from {source} takes no ratings; --trust ratings and fused do")
         if self.ratings_port is not None and not 0 <= self.ratings_port <= 65535:
@@ -53,3 +53,8 @@ class Supervision:
 
 NOBODY = Supervision()
 """Nobody watches."""
+
+
+def takes_ratings(scenario: Scenario) -> bool:
+    """Whether its trust listens to people."""
+    return scenario.trust.source in ("ratings", "fused")

@@ -15,7 +15,7 @@ def installed() -> dict[str, str]:
 
 
 def others(recorded: Mapping[str, str]) -> Iterator[str]:
-    """What was recorded with another version than is installed: its name, and both. recorded: a recording's metadata."""
+    """What was recorded with another version than is installed, and both. recorded: a recording's metadata."""
     for name, here in installed().items():
         if name in recorded and recorded[name] != here:
             yield f"{name} {recorded[name]} (here {here})"
