@@ -15,13 +15,13 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from gcs.flight import STALE_NS, Flight
+from gcs.fleet_table import age, age_s, fleet_table, mode, number, part, share, trust_bar
+from gcs.flight import Flight
 from gcs.flight_state import Phase
 from gcs.loop import Tick
 from gcs.recording import sentences
 from gcs.track import Parts, parts_of
 from gcs.unblocked import Unblocked
-from wire.modes import mode_name
 
 REFRESH_S = 0.1
 """Wall time between two pictures: a fast simulation is not slowed by its display."""
@@ -31,9 +31,7 @@ WARNING = 4
 """MAV_SEVERITY up to which a vehicle's words are shown."""
 MOST_ROWS = 24
 """Vehicles with a line of their own."""
-LEFT = ("UAV", "role", "mode")
-RIGHT = ("north", "east", "height", "speed", "battery", "link age", "trust")
-"""Columns, by where their cells stand."""
+COLUMNS = ("UAV", "role", "mode", "north", "east", "height", "speed", "battery", "link age", "trust")
 LEAST_NEEDED = ("battery", "role", "speed", "east", "north")
 """Columns that a narrow terminal goes without, the first first."""
 
@@ -113,15 +111,8 @@ class Display:
     def _table(self, tick: Tick) -> Table:
         ids = tick.swarm.ids[:MOST_ROWS]
         cells = zip(*(self._cells(tick, row) for row in range(len(ids))), strict=True)
-        columns = dict(zip((*LEFT, *RIGHT), cells, strict=True))
-        for heading in LEAST_NEEDED:
-            if sum(_width(*column) for column in columns.items()) > self._console.width:
-                del columns[heading]
-        table = Table(box=None, padding=(0, 1), header_style="dim")
-        for heading in columns:
-            table.add_column(heading, justify="left" if heading in LEFT else "right", no_wrap=True)
-        for row in zip(*columns.values(), strict=True):
-            table.add_row(*row)
+        columns = dict(zip(COLUMNS, cells, strict=True))
+        table = fleet_table(columns, width=self._console.width, least_needed=LEAST_NEEDED)
         if len(tick.swarm.ids) > MOST_ROWS:
             table.caption = f"and {len(tick.swarm.ids) - MOST_ROWS} more"
         return table
@@ -133,29 +124,16 @@ class Display:
         north, east = diagnosis.position_ne[row]
         return (
             Text(str(system)),
-            _part(system, self._parts, released=bool(tick.state.released[row])),
-            _mode(bool(swarm.armed[row]), int(swarm.autopilot[row]), int(swarm.custom_mode[row])),
-            _number(north, "m"),
-            _number(east, "m"),
-            _number(-swarm.position_ned[row, 2], "m"),
-            _number(math.hypot(*swarm.velocity_ned[row, :2]), "m/s"),
-            Text("–" if math.isnan(swarm.battery[row]) else f"{swarm.battery[row]:.0%}"),
-            _age(tick.time_ns, int(swarm.position_ns[row])),
-            _trust_bar(float(diagnosis.trust[row])),
+            part(system, self._parts, released=bool(tick.state.released[row])),
+            mode(bool(swarm.armed[row]), int(swarm.autopilot[row]), int(swarm.custom_mode[row])),
+            number(north, "m"),
+            number(east, "m"),
+            number(-swarm.position_ned[row, 2], "m"),
+            number(math.hypot(*swarm.velocity_ned[row, :2]), "m/s"),
+            share(float(swarm.battery[row])),
+            age(age_s(tick.time_ns, int(swarm.position_ns[row]))),
+            trust_bar(float(diagnosis.trust[row])),
         )
-
-
-def _width(heading: str, cells: tuple[Text, ...]) -> int:
-    """Of a column on the screen, with the space around it."""
-    return max(len(heading), *(cell.cell_len for cell in cells)) + 2
-
-
-def _part(system: int, parts: Parts, *, released: bool) -> Text:
-    if released:
-        return Text("not ours", style="red")
-    if system in parts.left_behind:
-        return Text("left behind", style="yellow")
-    return Text("leader" if system in parts.leaders else "follower")
 
 
 def _clock(tick: Tick, flight: Flight) -> str:
@@ -165,23 +143,3 @@ def _clock(tick: Tick, flight: Flight) -> str:
     if mission_s > flight.plan.read_out_s:
         return f"{mission_s:6.1f} s of mission"
     return f"{mission_s:6.1f} of {flight.plan.read_out_s:.1f} s"
-
-
-def _mode(armed: bool, autopilot: int, custom_mode: int) -> Text:
-    return Text(mode_name(autopilot, custom_mode)) if armed else Text("disarmed", style="dim")
-
-
-def _number(value: float, unit: str) -> Text:
-    return Text("–" if math.isnan(value) else f"{value:.1f} {unit}")
-
-
-def _age(now_ns: int, position_ns: int) -> Text:
-    if position_ns <= 0:
-        return Text("not heard", style="yellow")
-    age_s = (now_ns - position_ns) / 1e9
-    return Text(f"{age_s:.2f} s", style="red" if age_s > STALE_NS / 1e9 else "")
-
-
-def _trust_bar(trust: float) -> Text:
-    style = "green" if trust >= 0.5 else "red"
-    return Text(f"{'█' * round(trust * 5):·>5} {trust:.2f}", style=style)
