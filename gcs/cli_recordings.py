@@ -80,6 +80,7 @@ def replay(
             to=to,
             to_network=to_network,
             foxglove_port=foxglove_port if foxglove else None,
+            as_json=json,
         )
         return play(recording, playing)
 
