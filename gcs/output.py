@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from itertools import count as counted
 from pathlib import Path
 
+from gcs.recording import files
 from gcs.recording.files import RecordingError
 from gcs.recording.reader import RECORDING
 from scenarios import Scenario
@@ -40,20 +41,48 @@ def whole(path: Path, option: str = "--out") -> Iterator[Path]:
             unfinished.unlink(missing_ok=True)
 
 
-A_VEHICLE_MINUTE, A_PAIR_MINUTE = 1_000_000, 20_000
-"""Bytes of a recording, at most: frames of each vehicle, and what each thinks of each."""
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """The same of a folder, which is there to be filled. Raises Unwritable."""
+    with whole(path) as unfinished:
+        shutil.rmtree(unfinished, ignore_errors=True)
+        unfinished.mkdir()
+        try:
+            yield unfinished
+        except BaseException:
+            shutil.rmtree(unfinished, ignore_errors=True)
+            raise
+
+
+def check_free(path: Path, option: str = "--out") -> None:
+    """Raises Unwritable where something is: it may be a recording, or its journal."""
+    if path.is_file() or (path.is_dir() and any(path.iterdir())):
+        raise Unwritable(f"{option} {path}: is there already: name another, or take it away")
+
+
+A_VEHICLE_MINUTE, A_PAIR_MINUTE = 2_000_000, 20_000
+"""Bytes of a recording and its journal, at most: frames of each vehicle, and what each thinks of each."""
 
 
 def make_room(folder: Path) -> Path | None:
-    """Take what an earlier run left out of the way: its recording is kept under the time it was closed at."""
+    """Take what an earlier run left out of the way: its recording, further parts of it and its journal are kept
+    under the time they were closed at.
+    """
     for name in ("summary.json", PICTURE):
         (folder / name).unlink(missing_ok=True)
     recording = folder / RECORDING
-    if not recording.is_file() or recording.stat().st_size == 0:
+    earlier = [path for path in (recording, files.journal(recording), *files.further_parts(recording)) if _holds(path)]
+    if not earlier:
         return None
-    closed = dt.datetime.fromtimestamp(recording.stat().st_mtime, dt.UTC).strftime("%Y%m%dT%H%M%S")
-    namesakes = _namesakes(folder, f"run-{closed}", ".mcap")
-    return recording.rename(next(path for path in namesakes if not path.exists()))
+    closed = max(path.stat().st_mtime for path in earlier)
+    stem = f"{recording.stem}-{dt.datetime.fromtimestamp(closed, dt.UTC):%Y%m%dT%H%M%S}"
+    kept = next(path for path in _namesakes(folder, stem, recording.suffix) if not any(folder.glob(f"{path.stem}.*")))
+    first, *_ = [path.rename(folder / f"{kept.stem}{path.name.removeprefix(recording.stem)}") for path in earlier]
+    return first
+
+
+def _holds(path: Path) -> bool:
+    return path.is_file() and path.stat().st_size > 0
 
 
 def room(scenario: Scenario) -> int:

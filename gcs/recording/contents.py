@@ -10,6 +10,7 @@ from mcap.reader import SeekingReader
 from mcap.stream_reader import StreamReader
 
 from gcs.recording.reader import RECORD_SIZE_LIMIT, readable
+from wire.frames import Frame, Framer
 
 RAW = "mavlink"
 """Encoding of the topics of raw frames."""
@@ -28,3 +29,12 @@ def frames(path: Path) -> Iterator[tuple[int, bytes]]:
         for _schema, channel, message in reader.iter_messages():
             if channel.message_encoding == RAW:
                 yield message.log_time, message.data
+
+
+def frame_of(time_ns: int, raw: bytes) -> Frame | None:
+    """A recorded frame, taken apart; None of a message that our dialect lacks, whatever may be inside it."""
+    found = _framer.frames(time_ns, raw)
+    return found[0] if found and found[0].raw == raw else None
+
+
+_framer = Framer()

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,9 +10,9 @@ from mcap.records import Channel, Message
 from rich import box
 from rich.table import Table as Listing
 
-from gcs.output import Unwritable, whole
+from gcs.output import check_free, whole, whole_folder
 from gcs.recording import tables
-from gcs.recording.contents import RAW, frames, records
+from gcs.recording.contents import RAW, frame_of, frames, records
 from gcs.recording.copied import Copy
 from gcs.recording.decoded import DecodedTopics
 from gcs.recording.mcap_file import McapFile
@@ -22,7 +20,6 @@ from gcs.recording.reader import UnreadableRecording, located
 from gcs.recording.table_files import MEANINGS, CsvFile, TableFile, TableFolder, parquet_file
 from gcs.recording.tidy import Row, Tidy, of_frame
 from gcs.recording.tlog import packed
-from wire.frames import Framer
 
 Form = Literal["tlog", "csv", "parquet", "mcap"]
 NAMES: dict[Form, str] = {"tlog": "-frames.tlog", "csv": "-csv", "parquet": "-parquet", "mcap": "-decoded.mcap"}
@@ -39,15 +36,9 @@ def export(path: Path, *, to: Form, out: Path | None, console: Any) -> int:
         raise UnreadableRecording(f"{path}: no recording: gcs log import makes one of it")
     if out is None:
         out = path.with_name(f"{path.stem}{NAMES[to]}")
-    _check_free(out)
+    check_free(out)
     FORMS[to](path, out, console)
     return 0
-
-
-def _check_free(out: Path) -> None:
-    """Nothing is replaced: it may be a recording, or its journal."""
-    if out.is_file() or (out.is_dir() and any(out.iterdir())):
-        raise Unwritable(f"--out {out}: is there already: name another, or take it away")
 
 
 def _say(console: Any, line: str) -> None:
@@ -66,20 +57,20 @@ def _to_tlog(path: Path, out: Path, console: Any) -> None:
 
 def _to_mcap(path: Path, out: Path, console: Any) -> None:
     """All that is there, and decoded messages beside their frames. Those that are there already are not doubled."""
-    framer = Framer()
     with whole(out) as unfinished, McapFile(unfinished) as file:
         decoded, copy = DecodedTopics(file), Copy(file)
         for record in records(path):
             raw = copy.take(record)
             if raw is not None:
-                for frame in framer.frames(raw.log_time, raw.data):
+                frame = frame_of(raw.log_time, raw.data)
+                if frame is not None:
                     decoded.add(frame)
     _say(console, f"{out.resolve()}: {copy.written} messages, and {decoded.written} decoded")
 
 
 def _to_tables(path: Path, out: Path, console: Any, *, kind: Callable[[Path, tables.Table], TableFile]) -> None:
     """A folder of tables."""
-    with _whole_folder(out) as unfinished, TableFolder(unfinished, kind) as folder:
+    with whole_folder(out) as unfinished, TableFolder(unfinished, kind) as folder:
         for table, row in _rows(path):
             folder.add(table, row)
         if any(table.name in folder.rows for table in tables.OURS):  # a flight of ours has all of them, rows or none
@@ -96,32 +87,19 @@ def _to_tables(path: Path, out: Path, console: Any, *, kind: Callable[[Path, tab
 
 def _rows(path: Path) -> Iterator[tuple[tables.Table, Row]]:
     """Every row that a recording makes, with its table."""
-    framer, tidy, channels = Framer(), Tidy(), dict[int, Channel]()
+    tidy, channels = Tidy(), dict[int, Channel]()
     for record in records(path):
         if isinstance(record, Channel):
             channels[record.id] = record
         elif isinstance(record, Message):
             channel = channels[record.channel_id]
             if channel.message_encoding == RAW:
-                for frame in framer.frames(record.log_time, record.data):
-                    row = of_frame(frame)
-                    if row is not None:
-                        yield row
+                frame = frame_of(record.log_time, record.data)
+                row = None if frame is None else of_frame(frame)
+                if row is not None:
+                    yield row
             elif channel.message_encoding == "json":
                 yield from tidy.rows(channel.topic, record.log_time, record.data)
-
-
-@contextmanager
-def _whole_folder(path: Path) -> Iterator[Path]:
-    """A folder beside this one to write into, which takes its place whole or not at all."""
-    with whole(path) as unfinished:
-        shutil.rmtree(unfinished, ignore_errors=True)
-        unfinished.mkdir()
-        try:
-            yield unfinished
-        except BaseException:
-            shutil.rmtree(unfinished, ignore_errors=True)
-            raise
 
 
 def _to_csv(path: Path, out: Path, console: Any) -> None:

@@ -1,0 +1,119 @@
+"""`gcs log import`: another ground station's .tlog as MCAP, for the same commands as a flight of ours."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+from gcs.console import say
+from gcs.output import check_free, whole
+from gcs.recording.contents import RAW, frame_of
+from gcs.recording.decoded import DecodedTopics
+from gcs.recording.mcap_file import McapFile
+from gcs.recording.reader import UnreadableRecording
+from gcs.recording.tlog import Entries, Entry
+from wire.frames import MAGIC_2
+
+IMPORTED = "imported"
+"""Name of the metadata record that says where the frames came from; such a recording has no scenario."""
+
+CLOCKS_WERE_SET_US = 315_532_800_000_000
+"""1980, where GPS time begins: a clock before it was never set."""
+BACK_US, AHEAD_US = 1_000_000, 3_600_000_000
+"""Links of one log deliver out of order by less than the one, and no flight is silent for as long as the other."""
+
+
+def import_tlog(path: Path, *, out: Path | None, console: Any) -> int:
+    """Write raw frames by sender, and decoded beside them. Exit code. Raises UnreadableRecording and Unwritable."""
+    out = path.with_suffix(".mcap") if out is None else out
+    check_free(out)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise UnreadableRecording(f"{path}: cannot be read: {error.strerror or error}") from None
+    log, clock = Entries(data), Clock()
+    with whole(out) as unfinished, McapFile(unfinished) as file:
+        senders = _Senders(file)
+        for entry in log:
+            clock.take(entry.time_us)
+            senders.add(entry)
+        if not senders.frames:
+            raise UnreadableRecording(f"{path}: no .tlog: there is no MAVLink frame behind a time in it")
+        file.metadata(
+            IMPORTED,
+            {
+                "file": path.name,
+                "bytes": str(len(data)),
+                "sha256": hashlib.sha256(data).hexdigest(),
+                "frames": str(senders.frames),
+                "skipped_bytes": str(log.skipped),
+            },
+        )
+    for problem in clock.problems():
+        say(f"gcs: {path}: {problem}")
+    skipped = f"; {log.skipped} of {len(data)} bytes were none" if log.skipped else ""
+    line = f"{out.resolve()}: {senders.frames} frames of {senders.count} senders{skipped}"
+    console.print(line, highlight=False, soft_wrap=True, markup=False)
+    return 0
+
+
+class _Senders:
+    """Raw and decoded topics of whoever is in a log."""
+
+    def __init__(self, file: McapFile) -> None:
+        self._file = file
+        self._decoded = DecodedTopics(file)
+        self._channels: dict[tuple[int, int], int] = {}
+        self.frames = 0
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self._channels)
+
+    def add(self, entry: Entry) -> None:
+        """A frame at its time. Raises OSError."""
+        time_ns, raw = entry.time_us * 1000, entry.raw
+        system, component = raw[5:7] if raw[0] == MAGIC_2 else raw[3:5]
+        channel = self._channels.get((system, component))
+        if channel is None:
+            channel = self._file.channel(f"/mavlink/{system}_{component}/raw", RAW)
+            self._channels[system, component] = channel
+        self._file.add(channel, time_ns, raw)
+        self.frames += 1
+        frame = frame_of(time_ns, raw)
+        if frame is not None:
+            self._decoded.add(frame)
+
+
+class Clock:
+    """Watches the times of a log, and says what is strange about them."""
+
+    def __init__(self) -> None:
+        self._first_us: int | None = None
+        self._last_us = 0
+        self._back_us: list[int] = []
+        self._ahead_us: list[int] = []
+
+    def take(self, time_us: int) -> None:
+        """The time of the next frame, since 1970."""
+        if self._first_us is None:
+            self._first_us = self._last_us = time_us
+        step_us = time_us - self._last_us
+        if step_us < -BACK_US:
+            self._back_us.append(-step_us)
+        elif step_us > AHEAD_US:
+            self._ahead_us.append(step_us)
+        self._last_us = time_us
+
+    def problems(self) -> list[str]:
+        """A sentence each."""
+        said = []
+        if self._first_us is not None and self._first_us < CLOCKS_WERE_SET_US:
+            said.append("its clock begins before 1980: it was not set")
+        for steps, words in ((self._back_us, "goes back"), (self._ahead_us, "jumps ahead")):
+            if steps:
+                times = "once" if len(steps) == 1 else f"{len(steps)} times"
+                said.append(f"its clock {words} {times}, by up to {max(steps) / 1e6:.0f} s: frames keep their order")
+        return said
