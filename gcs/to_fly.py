@@ -86,7 +86,7 @@ def _remark(told: Mapping[str, str], pages: list[RecordedTick], path: Path, say:
         raise UnreadableRecording(f"{path}: holds no tick of the flight")
     lost = pages[-1].number + 1 - len(pages)
     if lost:
-        say(f"{path}: lacks {lost} ticks; what was said in them is not said again")
+        say(f"{path}: lacks {lost} of its ticks; what was said in them is not said again")
 
 
 def _at_their_ticks(pages: Iterable[RecordedTick], *, rated: bool) -> Callable[[], tuple[Event, ...]]:
