@@ -1,0 +1,210 @@
+"""What can be trusted of the bytes of an MCAP file that is torn or damaged.
+
+One flipped bit costs one chunk, and nothing that is wrong comes out of it: see `pieces`. The summary has a CRC of its
+own. Whatever else a file holds tells nothing that is not rebuilt.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections import Counter, defaultdict
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from io import BytesIO
+from typing import NamedTuple
+
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Chunk, Footer, Metadata, Schema
+
+from gcs.recording.contents import RAW, frame_of
+from gcs.recording.mcap_file import MAGIC
+from gcs.recording.pieces import MESSAGE, RECORD, content_of, pieces, records, stream_of
+from gcs.recording.seal import is_sealed
+
+_INDEX = struct.Struct("<BQHI")
+"""How the index of a chunk's messages begins: opcode, length, channel, and the length of its entries."""
+_INDEX_HEAD, _DATA_END_LENGTH = 6, 4
+_FOOTER_BYTES = 29
+
+
+class Rescued(NamedTuple):
+    """A message that is certainly what was recorded."""
+
+    topic: str
+    encoding: str
+    schema: Schema | None
+    time_ns: int
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """A stretch of the file that tells nothing."""
+
+    at: int
+    """Bytes before it."""
+    length: int
+    """Bytes."""
+    after_ns: int | None
+    """Time of the last message before it; None where there is none."""
+    before_ns: int | None
+    """Time of the first message behind it; None where there is none."""
+
+
+@dataclass(eq=False)
+class Salvaged:
+    """What is left of a file."""
+
+    ended: bool = False
+    """Whether it has its summary, whole."""
+    damage: list[Damage] = field(default_factory=list)
+    attachments: list[Attachment] = field(default_factory=list)
+    metadata: list[Metadata] = field(default_factory=list)
+    """None that is known to be damaged."""
+    chunks: list[Chunk] = field(default_factory=list)
+    """Those whose content is right."""
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    counts: Counter[int] = field(default_factory=Counter)
+    """Channel → messages."""
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing is missing."""
+        return self.ended and not self.damage
+
+    @property
+    def unsealed(self) -> list[str]:
+        """Names of metadata that nothing vouches for: they came without a CRC."""
+        return [record.name for record in self.metadata if is_sealed(record.name, record.metadata) is None]
+
+    @property
+    def unnamed(self) -> int:
+        """Messages that are whole, but what they belong to is lost."""
+        return self.counts.total() - sum(self.counts[number] for number in self._named())
+
+    def messages(self) -> Iterator[Rescued]:
+        """All messages whose topic is known, in the file's order."""
+        named = self._named()
+        for number, time_ns, data in self._messages(named):
+            topic, encoding, schema = named[number]
+            yield Rescued(topic, encoding, schema, time_ns, data)
+
+    def _messages(self, channels: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
+        for chunk in self.chunks:
+            content = content_of(chunk)
+            for opcode, start, stop in records(content):
+                if opcode == Opcode.MESSAGE:
+                    number, _sequence, time_ns, _publish_ns = MESSAGE.unpack_from(content, start)
+                    if number in channels:
+                        yield number, time_ns, content[start + MESSAGE.size : stop]
+
+    def _named(self) -> Mapping[int, tuple[str, str, Schema | None]]:
+        """Channel → topic, encoding and schema, of all that are known."""
+        named = {
+            number: (channel.topic, channel.message_encoding, self.schemas.get(channel.schema_id))
+            for number, channel in self.channels.items()
+            if channel.schema_id == 0 or channel.schema_id in self.schemas
+        }
+        return named | {number: (topic, RAW, None) for number, topic in self._told_by_frames(named)}
+
+    def _told_by_frames(self, named: Collection[int]) -> Iterator[tuple[int, str]]:
+        """Channels without a name of which every message is a whole frame of one sender, and their topics."""
+        senders: defaultdict[int, set[tuple[int, int] | None]] = defaultdict(set)
+        for number, time_ns, data in self._messages(self.counts.keys() - named):
+            frame = frame_of(time_ns, data)
+            senders[number].add(None if frame is None else (frame.system, frame.component))
+        for number, found in senders.items():
+            sender = found.pop()
+            if sender is not None and not found:
+                yield number, raw_topic(*sender)
+
+
+def raw_topic(system: int, component: int) -> str:
+    """Of a sender's raw frames."""
+    return f"/mavlink/{system}_{component}/raw"
+
+
+def salvage(data: bytes) -> Salvaged:
+    """Everything in a file that can be trusted."""
+    left = Salvaged()
+    _take_summary(left, data)
+    last_ns: int | None = None
+    holes: list[Damage] = []
+    """Behind the last chunk."""
+    reached = 0
+    for start, stop, record in pieces(data):
+        holes += _unexplained(data, reached, start, last_ns)
+        reached = stop
+        if isinstance(record, Chunk):
+            first_ns, behind_ns = _take(left, record)
+            left.damage += (replace(hole, before_ns=first_ns) for hole in holes)
+            holes, last_ns = [], last_ns if behind_ns is None else behind_ns
+        elif isinstance(record, Attachment):
+            left.attachments.append(record)
+        else:
+            left.metadata.append(record)
+    left.damage += [*holes, *_unexplained(data, reached, len(data), last_ns)]
+    return left
+
+
+def _take(left: Salvaged, chunk: Chunk) -> tuple[int | None, int | None]:
+    """Times of the chunk's first and last message; None of a chunk without."""
+    left.chunks.append(chunk)
+    first_ns = last_ns = None
+    content = content_of(chunk)
+    for opcode, start, stop in records(content):
+        if opcode == Opcode.MESSAGE:
+            number, _sequence, last_ns, _publish_ns = MESSAGE.unpack_from(content, start)
+            left.counts[number] += 1
+            first_ns = last_ns if first_ns is None else first_ns
+        else:
+            _define(left, opcode, content[start:stop])
+    return first_ns, last_ns
+
+
+def _define(left: Salvaged, opcode: int, body: bytes) -> None:
+    stream = ReadDataStream(BytesIO(body))
+    if opcode == Opcode.SCHEMA:
+        schema: Schema = Schema.read(stream)
+        left.schemas[schema.id] = schema
+    elif opcode == Opcode.CHANNEL:
+        channel: Channel = Channel.read(stream)
+        left.channels[channel.id] = channel
+
+
+def _take_summary(left: Salvaged, data: bytes) -> None:
+    """Whether the file ended, and the schemas and channels that its summary repeats."""
+    end = len(data) - len(MAGIC)
+    at = end - _FOOTER_BYTES
+    if at < len(MAGIC) or data[end:] != MAGIC or RECORD.unpack_from(data, at) != (Opcode.FOOTER, _FOOTER_BYTES - 9):
+        return
+    footer: Footer = Footer.read(stream_of(data[at:end]))
+    right = zlib.crc32(data[footer.summary_start : end - 4]) == footer.summary_crc
+    left.ended = right or footer.summary_crc == 0
+    if right:
+        summary = data[footer.summary_start : at]
+        for opcode, start, stop in records(summary):
+            _define(left, opcode, summary[start:stop])
+
+
+def _unexplained(data: bytes, start: int, stop: int, after_ns: int | None) -> Iterator[Damage]:
+    """What lies between two pieces, from the first byte on that is not as it should be there."""
+    at = start
+    if start == 0 and data.startswith(MAGIC):
+        at = len(MAGIC)
+    while at < stop:
+        opcode, length, _channel, entries = (
+            _INDEX.unpack_from(data, at) if at + _INDEX.size <= len(data) else (0, 0, 0, 0)
+        )
+        behind = at + RECORD.size + length
+        if opcode == Opcode.DATA_END and length == _DATA_END_LENGTH and stop == len(data):
+            return  # the summary has a CRC of its own, and is rebuilt
+        header = opcode == Opcode.HEADER and at == len(MAGIC)
+        index = opcode == Opcode.MESSAGE_INDEX and entries == length - _INDEX_HEAD
+        if behind > stop or not (header or index):
+            yield Damage(at, stop - at, after_ns, None)
+            return
+        at = behind
