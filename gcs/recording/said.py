@@ -24,7 +24,7 @@ from gcs.telemetry import NEVER
 from gcs.track import Parts, parts_of
 from scenarios import Scenario
 
-SEVERITIES = (Log.FATAL, Log.FATAL, Log.FATAL, Log.ERROR, Log.WARNING, Log.INFO, Log.INFO, Log.DEBUG)
+SEVERITIES = (Log.FATAL, Log.FATAL, Log.ERROR, Log.ERROR, Log.WARNING, Log.INFO, Log.INFO, Log.DEBUG)
 """MAV_SEVERITY → level."""
 Said = tuple[Kind, int | None, Log.Level.ValueType, str]
 """What it is about, which vehicle (system id) if any, how grave it is, and the sentence."""
@@ -107,7 +107,7 @@ class Sayings:
         if diagnosis.phase is not self._phase:
             yield Kind.PHASE, None, Log.INFO, sentences.phase(diagnosis.phase.value, task)
         elif task != self._task:
-            yield Kind.PHASE, None, Log.WARNING, sentences.next_task(task)
+            yield Kind.PHASE, None, Log.INFO, sentences.next_task(task)
         self._phase, self._task, self._problem = diagnosis.phase, task, problem
 
 
