@@ -6,6 +6,7 @@ import errno
 import os
 import subprocess
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
@@ -24,11 +25,11 @@ def ffmpeg() -> str:
     try:
         from imageio_ffmpeg import get_ffmpeg_exe
     except ImportError:
-        raise BadUsageError("gcs video needs imageio-ffmpeg: pip install 'trustr[video]'") from None
+        raise BadUsageError("a film needs imageio-ffmpeg: pip install 'trustr[video]'") from None
     try:
         return str(get_ffmpeg_exe())
     except RuntimeError as error:
-        raise BadUsageError(f"gcs video needs ffmpeg: {error}") from None
+        raise BadUsageError(f"a film needs ffmpeg: {error}") from None
 
 
 class Encoder:
@@ -60,13 +61,12 @@ class Encoder:
     ) -> None:
         """The file is whole, or the program has ended all the same."""
         assert self._process.stdin is not None
+        if kind is not None:
+            self._process.kill()
         try:
-            if kind is not None:
-                self._process.kill()
-                self._process.wait()
-                return
-            self._process.stdin.close()
-            if self._process.wait() != 0:
+            with suppress(BrokenPipeError):  # then its exit code tells
+                self._process.stdin.close()
+            if self._process.wait() != 0 and kind is None:
                 self._fail()
         finally:
             self._said.close()

@@ -34,10 +34,13 @@ def film(history: History, path: Path, program: str, *, blind: bool, speed: floa
     motion = Motion.of(history)
     times_s = motion.frames(speed=speed, rate=RATE)
     pictures = unexplained(motion, times_s) if blind else explained(history, motion, times_s)
+    told = f"{len(times_s)} pictures, {len(times_s) / RATE:.0f} s of film"
+    if not console.is_terminal:
+        console.print(told, highlight=False)
     columns = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
-    with Encoder(path, program) as encoder, Progress(*columns, console=console, transient=True) as progress:
-        told = f"{len(times_s)} pictures, {len(times_s) / RATE:.0f} s of film"
-        for picture in progress.track(pictures, total=len(times_s), description=told):
+    bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+    with Encoder(path, program) as encoder, bar:
+        for picture in bar.track(pictures, total=len(times_s), description=told):
             encoder.add(picture)
 
 
