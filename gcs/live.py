@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 from gcs.commands import Beat
@@ -56,6 +56,7 @@ class Live:
         self._namesakes = namesakes
         self._meters: dict[int, Meter] = {}
         self._frames: list[Frame] = []
+        self._told: list[Callable[[Frame], None]] = []
         self._refused: Counter[str] = Counter()
         self._stations: dict[tuple[int, int], Station] = {}
 
@@ -84,6 +85,10 @@ class Live:
                 self.send(EVERYBODY, encoder.encode(Beat(), 0))
             self.sleep_until(min(until_ns, now_ns + step_ns))
             yield self.receive()
+
+    def tell(self, whom: Callable[[Frame], None]) -> None:
+        """Hand every frame of our vehicles to this one too, from now on and as it arrives."""
+        self._told.append(whom)
 
     def receive(self) -> list[Frame]:
         """Frames of our vehicles since the last call."""
@@ -154,6 +159,8 @@ class Live:
         if frame.component == AUTOPILOT:
             self._meters[frame.system].count(frame)
         self._frames.append(frame)
+        for whom in self._told:
+            whom(frame)
 
     def _note(self, station: Station) -> None:
         name = (station.system, station.component)

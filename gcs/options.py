@@ -13,6 +13,15 @@ Out = Annotated[
     Parameter(help="Folder for run.mcap, summary.json and trajectory.png; runs/TIME-SCENARIO if absent."),
 ]
 AsJson = Annotated[bool, Parameter(name="--json", negative=(), show_default=False, help="One JSON object on stdout.")]
+Decodes = Annotated[
+    bool,
+    Parameter(
+        name="--record-decoded",
+        negative=(),
+        show_default=False,
+        help="Record MAVLink messages as JSON, too; `gcs log export --to mcap` does it afterwards.",
+    ),
+]
 LinkTexts = Annotated[
     tuple[str, ...],
     Parameter(

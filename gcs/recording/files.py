@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 from pathlib import Path
 
 SCENARIO = "scenario.json"
@@ -19,6 +20,13 @@ class RecordingError(OSError):
 def part(recording: Path, number: int) -> Path:
     """The file in which a recording goes on after the disk took no more of it: run.part2.mcap, and so on."""
     return recording if number == 1 else recording.with_suffix(f".part{number}{recording.suffix}")
+
+
+def further_parts(recording: Path) -> list[Path]:
+    """Those of part 2 and on that are there, in their order."""
+    found = recording.parent.glob(f"{glob.escape(recording.stem)}.part*{recording.suffix}")
+    numbers = ((path.stem.removeprefix(f"{recording.stem}.part"), path) for path in found)
+    return [path for _, path in sorted((int(number), path) for number, path in numbers if number.isdecimal())]
 
 
 def journal(recording: Path) -> Path:

@@ -51,6 +51,10 @@ class Journal:
         """Why frames are missing, if any are."""
         return None if self._why is None else f"{self._path}: {self.missing} frames are missing: {self._why}"
 
+    def arrived(self, frame: Frame) -> None:
+        """One that came, under its time of arrival."""
+        self.note(frame.time_ns, frame.raw)
+
     def note(self, time_ns: int, frame: bytes) -> None:
         """One frame, in one write. time_ns: since 1970."""
         try:
