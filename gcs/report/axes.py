@@ -36,7 +36,9 @@ class Scale:
 
     def __call__(self, values: Any) -> Any:
         """Units of values, alone or in an array; beyond the ends too."""
-        return self.start + (np.asarray(values, np.float64) - self.low) / (self.high - self.low) * (self.end - self.start)
+        return self.start + (np.asarray(values, np.float64) - self.low) / (self.high - self.low) * (
+            self.end - self.start
+        )
 
     def within(self, values: Any) -> Any:
         """The same, kept inside the plot: a line that leaves it runs along its edge."""
@@ -45,6 +47,11 @@ class Scale:
     def ticks(self, most: int = 6) -> list[float]:
         """Round values, at most so many and at least two of them where the range holds them."""
         return round_values(self.low, self.high, most)
+
+
+def figure(value: float) -> str:
+    """A round value as it stands beside an axis."""
+    return f"{value + 0.0:g}"
 
 
 def round_values(low: float, high: float, most: int = 6) -> list[float]:
@@ -79,13 +86,18 @@ class Frame:
         """With room for these marks above and so many strips below. marks: at times, in seconds."""
         across = Scale(*time, LEFT, WIDTH - RIGHT)
         lanes = 1 + max((lane for lane, _ in _above(marks, across, unit)), default=0)
-        top = lanes * (TEXT + 1.0) + 4.0
+        top = lanes * (TEXT + 1.0) + 9.0
         bottom = top + plot
-        return Frame(across, Scale(*value, bottom, top), top, bottom + strips * STRIP + 2.6 * TEXT)
+        return Frame(
+            across,
+            Scale(*value, bottom, top),
+            top,
+            bottom + (strips * STRIP + STRIP / 2 if strips else 0.0) + 2.6 * TEXT,
+        )
 
 
 STRIP = 12.0
-"""Height of a strip under a plot."""
+"""Height of a strip under a plot; half of it is left free above the first."""
 
 
 def framed(
@@ -104,14 +116,16 @@ def framed(
     time, value = frame.time, frame.value
     bottom = value.start
     parts = []
-    for at, said in of_value if of_value is not None else [(tick, f"{tick:g}") for tick in value.ticks(5)]:
+    for at, said in of_value if of_value is not None else [(tick, figure(tick)) for tick in value.ticks(5)]:
         y = float(value(at))
         parts.append(element("line", x1=time.start, x2=time.end, y1=y, y2=y, class_="grid"))
         parts.append(words(time.start - 5, y + 0.35 * TEXT, said, "tick y", anchor="end"))
     for at in time.ticks(7):
         x = float(time(at))
-        parts.append(element("line", x1=x, x2=x, y1=frame.height - 2.6 * TEXT, y2=frame.height - 2.6 * TEXT + 3, class_="axis"))
-        parts.append(words(x, frame.height - 1.45 * TEXT, f"{at:g}", "tick x", anchor="middle"))
+        parts.append(
+            element("line", x1=x, x2=x, y1=frame.height - 2.6 * TEXT, y2=frame.height - 2.6 * TEXT + 3, class_="axis")
+        )
+        parts.append(words(x, frame.height - 1.45 * TEXT, figure(at), "tick x", anchor="middle"))
     parts.append(element("line", x1=time.start, x2=time.end, y1=bottom, y2=bottom, class_="axis"))
     parts.append(words((time.start + time.end) / 2, frame.height - 0.25 * TEXT, time_label, "quiet", anchor="middle"))
     parts.append(words(0.0, TEXT, unit, "quiet"))
@@ -142,7 +156,10 @@ def _beside(frame: Frame, names: Sequence[Label]) -> list[str]:
     shown = list(names[:MOST_NAMES])
     wanted = [float(frame.value.within(name.at)) for name in shown]
     places = apart(wanted, least=TEXT, low=frame.top + 4.0, high=frame.value.start)
-    said = [words(WIDTH - RIGHT + 4.0, y + 0.35 * TEXT, name.said, f"name {name.class_}") for y, name in zip(places, shown, strict=True)]
+    said = [
+        words(WIDTH - RIGHT + 4.0, y + 0.35 * TEXT, name.said, f"name {name.class_}")
+        for y, name in zip(places, shown, strict=True)
+    ]
     if len(names) > len(shown):
         said.append(words(WIDTH, frame.height - 1.45 * TEXT, f"+{len(names) - len(shown)}", "quiet", anchor="end"))
     return said

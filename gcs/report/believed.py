@@ -1,8 +1,8 @@
-"""Charts of what was believed: trust beside the truth of faults and what people said, and how much each robot was heeded."""
+"""Charts of what was believed: trust, beside the truth and what people said, and how much each robot was heeded."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -10,8 +10,8 @@ import numpy.typing as npt
 from gcs.events import Rating
 from gcs.recording import sentences
 from gcs.report.axes import STRIP, Frame, framed
-from gcs.report.judged import EACH, marks, mission_frame
-from gcs.report.robots import Drawn, Section, names, swarm
+from gcs.report.judged import marks, mission_frame
+from gcs.report.robots import Drawn, Section, key, names, swarm
 from gcs.report.series import heeded
 from gcs.report.svg import TEXT, element, hover, words
 from gcs.report.told import Told
@@ -33,42 +33,44 @@ def trust(flights: Sequence[Told]) -> Section:
     return Section(
         "trust",
         "Trust",
-        "A line falls below the dashed one when its robot is distrusted. The bars under the plot are the truth, which no "
-        "controller knew: while a fault acts on the robot of that number. Trust is right where a line is low above a bar, "
-        "and nowhere else.",
-        (*EACH, ("limit", "distrusted below"), ("fault bar", "truth: a fault acts"), ("air bar", "it blows on everyone"), *_rating_key(flights)),
+        "A line falls below the dashed one when its robot is distrusted. The bars under the plot are the truth, which "
+        "nobody in the air knew: while a fault acts on the robot of that number. Trust is right where a line is low "
+        "above its robot's bar, and nowhere else.",
+        (*key(flights), ("limit", "distrusted below"), *_truth_key(flights), *_rating_key(flights)),
         tuple(_trust(told, flights, strips) for told in flights),
     )
 
 
 def weights(flights: Sequence[Told]) -> Section:
     """How much the swarm heeds each robot."""
-    shares = [heeded(told.history.weights[told.mission]) for told in flights]
+    shares = [heeded(told.history.weights[told.mission], told.scored) for told in flights]
     top = max([0.1, *(1.1 * float(np.nanmax(share, initial=0.0)) for share in shares)])
     return Section(
         "weights",
         "Who is heeded",
-        "The mean weight that robots give to each robot when they choose their velocity. Averaged control heeds all "
-        "alike; a controller that protects the swarm takes the failed robot's line to the bottom.",
-        (*EACH, ("limit", "an equal share")),
+        "The mean weight that healthy robots give to each robot as they choose their velocity. Averaged control heeds "
+        "all alike; a controller that protects the swarm takes the failed robot's line to the bottom.",
+        (*key(flights), ("limit", "an equal share")),
         tuple(_weights(told, flights, share, top) for told, share in zip(flights, shares, strict=True)),
     )
 
 
 def _trust(told: Told, flights: Sequence[Told], strips: int) -> Drawn:
     said = _trust_in_words(told)
+    if not told.mission.size:
+        return Drawn("", said)
     frame = mission_frame(told, flights, (0.0, 1.0), "trust", strips=strips)
     parts = _strips(told, frame)
     beside = []
-    if told.trust_source is not None and told.mission.size:
+    if told.trust_source is not None:
         value = told.history.trust[told.mission]
         y = float(frame.value(DISTRUSTED))
         parts.append(element("line", x1=frame.time.start, x2=frame.time.end, y1=y, y2=y, class_="limit"))
         parts += [*swarm(frame, told, told.mission, value), *_ratings(told, frame)]
-        beside = names(told, value)
+        beside = names(frame, told, value)
     else:
         middle = (frame.time.start + frame.time.end) / 2, (frame.value.start + frame.value.end) / 2
-        parts.append(words(*middle, "not asked for" if told.mission.size else "no mission", "quiet", anchor="middle"))
+        parts.append(words(*middle, "not asked for", "quiet", anchor="middle"))
     svg = framed(
         frame,
         parts,
@@ -105,19 +107,28 @@ def _struck(told: Told) -> list[int | None]:
 def _strips(told: Told, frame: Frame) -> list[str]:
     """The truth, a strip for each robot."""
     parts = []
+    ends_s = float(told.since_s[told.mission[-1]])
     for index, system in enumerate(struck := _struck(told)):
         strip = min(index, MOST_STRIPS - 1)
-        y = frame.value.start + 4.0 + strip * STRIP
+        y = frame.value.start + (strip + 0.75) * STRIP
         if index == strip:
             more = strip == MOST_STRIPS - 1 and len(struck) > MOST_STRIPS
             name = f"+{len(struck) - strip}" if more else EVERYONE if system is None else str(system)
             parts.append(words(frame.time.start - 5, y + 0.75 * TEXT, name, "tick y failed", anchor="end"))
         for span in told.history.faults:
             if span.vehicle == system:
-                begin, end = (float(frame.time.within(at)) for at in (span.from_s, span.to_s))
+                begin, end = (float(frame.time.within(min(at, ends_s))) for at in (span.from_s, span.to_s))
                 class_ = "air bar" if system is None else "fault bar"
                 parts.append(
-                    element("rect", hover(span.words), x=begin, y=y, width=max(end - begin, 1.0), height=STRIP - 4.0, class_=class_)
+                    element(
+                        "rect",
+                        hover(span.words),
+                        x=begin,
+                        y=y,
+                        width=max(end - begin, 1.0),
+                        height=STRIP - 4.0,
+                        class_=class_,
+                    )
                 )
     return parts
 
@@ -126,7 +137,9 @@ def _ratings(told: Told, frame: Frame) -> list[str]:
     """What people said, at 0 for 1 of 5 to 1 for 5 of 5: round of a robot, square of the swarm."""
     said = [rating for rating in told.history.ratings if rating.time_s is not None]
     figures = len(said) <= MOST_FIGURES
-    return [_rating(told, frame, rating, rating.time_s, figures=figures) for rating in said if rating.time_s is not None]
+    return [
+        _rating(told, frame, rating, rating.time_s, figures=figures) for rating in said if rating.time_s is not None
+    ]
 
 
 def _rating(told: Told, frame: Frame, rating: Rating, time_s: float, *, figures: bool) -> str:
@@ -139,6 +152,14 @@ def _rating(told: Told, frame: Frame, rating: Rating, time_s: float, *, figures:
         mark = element("circle", cx=x, cy=y, r=size, class_=f"rating {look}")
     value = words(x, y + 0.35 * TEXT, str(rating.rating), "value", anchor="middle") if figures else ""
     return element("g", hover(sentences.rating(rating)) + mark + value)
+
+
+def _truth_key(flights: Sequence[Told]) -> Iterator[tuple[str, str]]:
+    struck = {span.vehicle for told in flights for span in told.history.faults}
+    if struck - {None}:
+        yield "fault bar", "truth: a fault acts"
+    if None in struck:
+        yield "air bar", "truth: it blows on everyone"
 
 
 def _rating_key(flights: Sequence[Told]) -> tuple[tuple[str, str], ...]:
@@ -158,14 +179,20 @@ def _weights(told: Told, flights: Sequence[Told], share: Array, top: float) -> D
     ]
     said = _weights_in_words(told, share)
     svg = framed(
-        frame, parts, title="Weights", description=said, unit="weight", marks=marks(told), names=names(told, share)
+        frame,
+        parts,
+        title="Weights",
+        description=said,
+        unit="weight",
+        marks=marks(told),
+        names=names(frame, told, share),
     )
     return Drawn(svg, said)
 
 
 def _weights_in_words(told: Told, share: Array) -> str:
-    last = share[np.flatnonzero(np.isfinite(share).all(axis=1))[-1]]
+    mean = np.nanmean(share[np.isfinite(share).all(axis=1)], axis=0)
     failed = [row for row, look in enumerate(told.looks) if look == "failed"]
-    shown = failed or [int(last.argmin()), int(last.argmax())]
-    said = ", ".join(f"robot {told.history.ids[row]} {last[row]:.0%}" for row in dict.fromkeys(shown[:6]))
-    return f"In the end: {said} of all that is heeded; an equal share is {1 / told.count:.0%}."
+    shown = failed or [int(mean.argmin()), int(mean.argmax())]
+    said = ", ".join(f"robot {told.history.ids[row]}: {mean[row]:.1%}" for row in dict.fromkeys(shown[:6]))
+    return f"Over the mission, of all that is heeded: {said}; an equal share is {1 / told.count:.1%}."

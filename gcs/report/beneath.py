@@ -9,8 +9,9 @@ import numpy.typing as npt
 
 from gcs.flight_state import Phase
 from gcs.gate import FENCED, LATE_PERIODS, LOST_NS, REFUSED, SLOWED, WITHHELD
+from gcs.recording.history import Integers
 from gcs.report.axes import STRIP, Frame, framed
-from gcs.report.robots import Drawn, Section, line, swarm
+from gcs.report.robots import Drawn, Section, key, line, swarm
 from gcs.report.series import lost_share
 from gcs.report.svg import TEXT, Label, element, hover, path, words
 from gcs.report.told import Told
@@ -40,7 +41,7 @@ def links(flights: Sequence[Told]) -> Section:
         "Links",
         f"The age of what each vehicle last told of itself. Above the dashed line, at {LOST_NS / 1e9:g} s, it is taken "
         "for lost and sent nothing.",
-        (("robot healthy", "each robot"), ("limit", "taken for lost")),
+        (*key(flights), ("limit", "taken for lost")),
         tuple(_links(told, flights, top, worst) for told, worst in zip(flights, oldest, strict=True)),
     )
 
@@ -51,7 +52,7 @@ def batteries(flights: Sequence[Told]) -> Section:
         "battery",
         "Battery",
         "What each autopilot told of its battery. One that falls faster than the others has more work, or is older.",
-        (("robot healthy", "each robot"),),
+        key(flights),
         tuple(_battery(told, flights) for told in flights),
     )
 
@@ -74,9 +75,9 @@ def gate(flights: Sequence[Told]) -> Section:
     return Section(
         "gate",
         "Set-points that the gate changed",
-        "Whatever the controller asks for passes limits and fence before it is sent. A bar is a time at which a robot was "
-        "sent something else.",
-        tuple((f"{class_} bar", MEANT[verdict]) for verdict, class_ in CHANGES.items()),
+        "Whatever the controller asks for passes limits and fence before it is sent. A bar is a time at which a robot "
+        "was sent something else.",
+        tuple((f"{class_} bar", MEANT[code]) for code, class_ in CHANGES.items() if _any(flights, code)),
         tuple(_gate(told, flights) for told in flights),
     )
 
@@ -90,28 +91,35 @@ def _frame(told: Told, flights: Sequence[Told], value: tuple[float, float], unit
 
 def _marks(told: Told) -> list[Label]:
     phases = [(Phase.MISSION, "mission"), (Phase.HOLD, "holding"), (Phase.LAND, "landing")]
-    begins = [(told.history.phase.index(phase.value), name) for phase, name in phases if phase.value in told.history.phase]
+    begins = [
+        (told.history.phase.index(phase.value), name) for phase, name in phases if phase.value in told.history.phase
+    ]
     return [Label(float(told.since_s[row]), name) for row, name in begins]
+
+
+def _any(flights: Sequence[Told], code: int) -> bool:
+    return any((told.history.verdict == code).any() for told in flights)
 
 
 def _links(told: Told, flights: Sequence[Told], top: float, oldest: float) -> Drawn:
     if not told.since_s.size:
         return Drawn("", NO_TICKS)
+    if told.history.links is None and oldest == 0.0:
+        return Drawn("", "Flown in lockstep: every frame arrives, in the tick that it was sent in.")
     frame = _frame(told, flights, (0.0, top), "seconds")
     parts = swarm(frame, told, told.all_rows, told.history.age_s)
     if top > LOST_NS / 1e9:
         y = float(frame.value(LOST_NS / 1e9))
         parts.append(element("line", x1=frame.time.start, x2=frame.time.end, y1=y, y2=y, class_="limit"))
     lost = told.history.links
-    if lost is None:
-        how = "Flown in lockstep: every frame arrives, in the tick it was sent in."
-    else:
-        how = _lost_in_words(told)
-        share = lost_share(lost).mean(axis=1) if len(lost.time_ns) > 1 else np.empty(0)
-        if np.nanmax(share, initial=0.0) > 0.0:
+    if lost is not None and len(lost.time_ns) > 1:
+        share = lost_share(lost).max(axis=1)
+        if share.any():
             at = frame.time((lost.time_ns[1:] - told.history.time_ns[0]) / 1e9 + told.since_s[0])
-            parts.append(path(at, frame.value(share * top), "loss", "share of frames lost, full height is all"))
-    said = f"{how} Telemetry was never older than {oldest:.2f} s."
+            parts.append(
+                path(at, frame.value(share * top), "loss", "frames lost of the worst heard, full height is all")
+            )
+    said = f"{_lost_in_words(told)} Telemetry was never older than {oldest:.2f} s."
     svg = framed(frame, parts, title="Links", description=said, unit="seconds", marks=_marks(told))
     return Drawn(svg, said)
 
@@ -119,7 +127,7 @@ def _links(told: Told, flights: Sequence[Told], top: float, oldest: float) -> Dr
 def _lost_in_words(told: Told) -> str:
     lost = told.history.links
     if lost is None or not len(lost.time_ns):
-        return "The link told nothing of losses."
+        return "The link does not tell what it lost."
     missing = {
         system: gone / (gone + came)
         for system, gone, came in zip(told.history.ids, lost.lost[-1].tolist(), lost.received[-1].tolist(), strict=True)
@@ -128,7 +136,9 @@ def _lost_in_words(told: Told) -> str:
     if not missing:
         return "Not one frame was lost."
     worst = max(missing, key=missing.__getitem__)
-    return f"Frames were lost of {len(missing)} of {told.count} robots, of robot {worst} the most: {missing[worst]:.1%}."
+    return (
+        f"Frames were lost of {len(missing)} of {told.count} robots, of robot {worst} the most: {missing[worst]:.1%}."
+    )
 
 
 def _battery(told: Told, flights: Sequence[Told]) -> Drawn:
@@ -136,9 +146,14 @@ def _battery(told: Told, flights: Sequence[Told]) -> Drawn:
     if not np.isfinite(value).any():
         return Drawn("", "No vehicle told of its battery.")
     frame = _frame(told, flights, (0.0, 100.0), "percent")
-    at_the_end = [(column[np.isfinite(column)][-1], system) for column, system in zip(value.T, told.history.ids, strict=True) if np.isfinite(column).any()]
-    least, whose = min(at_the_end)
-    said = f"From {np.nanmax(value):.0%} to {least:.0%} at the least, robot {whose}."
+    at_the_end = [
+        (column[np.isfinite(column)][-1], system)
+        for column, system in zip(value.T, told.history.ids, strict=True)
+        if np.isfinite(column).any()
+    ]
+    (least, whose), (most, _) = min(at_the_end), max(at_the_end)
+    whom = "of all alike" if least == most else f"of robot {whose}, and {most:.0%} at the most"
+    said = f"From {np.nanmax(value):.0%} to {least:.0%} {whom}."
     svg = framed(
         frame,
         swarm(frame, told, told.all_rows, 100.0 * value),
@@ -155,10 +170,10 @@ def _lateness(told: Told, flights: Sequence[Told], top: float) -> Drawn:
     late_ms, frames = told.history.lateness_s * 1e3, told.history.frames
     if not late_ms.size:
         return Drawn("", NO_TICKS)
-    taken = f"{_spread(frames, '.0f')} frames came in a tick."
+    taken = f"Frames that came in a tick: {_spread(frames, '.0f')}."
     if not (late_ms > 0.0).any():
         return Drawn("", f"Every one of {len(late_ms)} ticks was decided on time. {taken}")
-    said = f"{_spread(late_ms, '.1f', ' ms')} late. {taken}"
+    said = f"Late by {_spread(late_ms, '.1f', ' ms')}. {taken}"
     frame = _frame(told, flights, (0.0, top), "ms")
     svg = framed(
         frame,
@@ -171,7 +186,7 @@ def _lateness(told: Told, flights: Sequence[Told], top: float) -> Drawn:
     return Drawn(svg, said)
 
 
-def _spread(values: npt.NDArray[np.generic], form: str, unit: str = "") -> str:
+def _spread(values: Array | Integers, form: str, unit: str = "") -> str:
     median, high = (format(float(np.percentile(values, share)), form) for share in (50, 99))
     return f"{median}{unit} in the median, {high}{unit} at p99, {format(float(values.max()), form)}{unit} at most"
 
@@ -189,7 +204,8 @@ def _gate(told: Told, flights: Sequence[Told]) -> Drawn:
     rows = np.flatnonzero(np.isin(verdict, list(CHANGES)).any(axis=0)).tolist()
     shown = rows[:MOST_ROWS]
     if len(rows) > len(shown):
-        said += f" Drawn are {robots([told.history.ids[row] for row in shown])}; {len(rows) - len(shown)} more had some too."
+        whom = robots([told.history.ids[row] for row in shown])
+        said += f" Drawn are {whom}; {len(rows) - len(shown)} more had some too."
     frame = _frame(told, flights, (0.0, 1.0), "robot", plot=STRIP * len(shown) + 4.0)
     parts = [part for place, row in enumerate(shown) for part in _changes(told, frame, row, place)]
     svg = framed(frame, parts, title="Gate", description=said, unit="robot", of_value=(), marks=_marks(told))
@@ -212,5 +228,7 @@ def _changes(told: Told, frame: Frame, row: int, place: int) -> list[str]:
             from_s, to_s = told.since_s[begin], told.since_s[end - 1] + period_s
             x, width = float(frame.time(from_s)), float(frame.time(to_s) - frame.time(from_s))
             title = hover(f"robot {system} {MEANT[code]}, {from_s:.1f} s to {to_s:.1f} s")
-            parts.append(element("rect", title, x=x, y=y, width=max(width, 1.0), height=STRIP - 4.0, class_=f"{class_} bar"))
+            parts.append(
+                element("rect", title, x=x, y=y, width=max(width, 1.0), height=STRIP - 4.0, class_=f"{class_} bar")
+            )
     return parts

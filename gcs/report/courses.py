@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from gcs.report.axes import WIDTH, Scale, round_values, svg
-from gcs.report.robots import Drawn, Section
+from gcs.report.axes import WIDTH, Scale, figure, round_values, svg
+from gcs.report.robots import Drawn, Section, key
 from gcs.report.svg import LETTER, TEXT, element, hover, path, words
 from gcs.report.told import Told
 from gcs.words import robots
@@ -54,11 +54,11 @@ class Ground:
         for value in _multiples(self.east, step):
             x = float(self.east(value))
             parts.append(element("line", x1=x, x2=x, y1=self.north.end, y2=self.north.start, class_="grid"))
-            parts.append(words(x, self.north.start + TEXT + 2, f"{value:g}", "tick x", anchor="middle"))
+            parts.append(words(x, self.north.start + TEXT + 2, figure(value), "tick x", anchor="middle"))
         for value in _multiples(self.north, step):
             y = float(self.north(value))
             parts.append(element("line", x1=self.east.start, x2=self.east.end, y1=y, y2=y, class_="grid"))
-            parts.append(words(self.east.start - 4, y + 0.35 * TEXT, f"{value:g}", "tick y", anchor="end"))
+            parts.append(words(self.east.start - 4, y + 0.35 * TEXT, figure(value), "tick y", anchor="end"))
         middle = (self.east.start + self.east.end) / 2
         parts.append(words(middle, self.height - 2.0, "metres east, north is up", "quiet", anchor="middle"))
         return parts
@@ -76,16 +76,19 @@ def courses(flights: Sequence[Told]) -> Section:
     return Section(
         "map",
         "Where they went",
-        "The black line is the mean of the healthy robots, formation taken off: it should lie on the dashed plan and end "
-        "at the last star. Robots are drawn where they were as results were read.",
+        "The thick line is the mean of the healthy robots, formation taken off: it should lie on the dashed plan and "
+        "end at the last star. Robots are drawn where they were as results were read: leaders as triangles, failed "
+        "ones as crosses, those left behind hollow.",
         (
             ("plan", "planned"),
-            ("cut", "interrupted by an emergency call"),
+            *(
+                (("cut", "broken off by an emergency call"),)
+                if any(told.history.scenario.event for told in flights)
+                else ()
+            ),
             ("mean", "mean of the healthy robots"),
             ("virtual", "virtual leader"),
-            ("robot healthy", "healthy robot, with a triangle if it leads"),
-            ("robot failed", "failed robot"),
-            ("robot doubted", "healthy, but distrusted"),
+            *key(flights),
         ),
         charts,
     )
@@ -107,88 +110,135 @@ def _ground(flights: Sequence[Told]) -> Ground:
 def _course(told: Told, ground: Ground) -> Drawn:
     rows = told.mission if told.mission.size else told.all_rows
     position = told.history.position[rows, :, :2]
-    parts = [*ground.grid(), *_plan(told, ground)]
-    if np.isfinite(position).any():
+    known = position[np.isfinite(position).all(axis=-1)]
+    parts = [
+        *ground.grid(),
+        *_plan(told, ground, np.column_stack([ground.east(known[:, 1]), ground.north(known[:, 0])])),
+    ]
+    if known.size:
         parts += _ways(told, ground, position)
     said = _in_words(told)
     return Drawn(svg(parts, ground.height, title="Map", description=said), said)
 
 
 def _ways(told: Told, ground: Ground, position: Array) -> list[str]:
+    """Lines of robots, of what led them and of their mean; where they were last on top."""
     order = sorted(range(told.count), key=lambda row: ("healthy", "doubted", "failed").index(told.looks[row]))
     crowd = " crowd" if told.crowded else ""
     parts = [
-        ground.way(position[:, row], f"robot {told.looks[row]}{crowd}", f"robot {told.history.ids[row]}") for row in order
+        ground.way(position[:, row], f"robot {told.looks[row]}{crowd}", f"robot {told.history.ids[row]}")
+        for row in order
     ]
+    end = []
     if told.mission.size:
         place = position - offsets_ne(told.history.scenario)
         mean = place[:, told.scored].mean(axis=1)
         parts.append(ground.way(told.history.virtual_ne[told.mission], "virtual", "virtual leader"))
         parts.append(ground.way(mean, "mean", "mean of the healthy robots"))
         x, y = ground.at(mean[-1])
-        parts.append(element("path", d=f"M{x:.1f},{y - 5:.1f}l5,5l-5,5l-5,-5Z", class_="end"))
-    return parts + [mark for row in order for mark in _robot(told, ground, row, position[-1, row])]
+        end = [
+            element(
+                "path", hover("mean of the healthy robots"), d=f"M{x:.1f},{y - 5:.1f}l5,5l-5,5l-5,-5Z", class_="end"
+            )
+        ]
+    seen = [row for row in order if np.isfinite(position[-1, row]).all()]
+    marks = [_robot(told, ground, row, position[-1, row]) for row in seen]
+    return [*parts, *_numbers(told, ground, position[-1], seen), *marks, *end]
 
 
-def _robot(told: Told, ground: Ground, row: int, place: Array) -> list[str]:
+def _robot(told: Told, ground: Ground, row: int, place: Array) -> str:
     """Where one robot was last, by its part: a cross has failed, a triangle leads; hollow if it was left behind."""
-    if not np.isfinite(place).all():
-        return []
     x, y = ground.at(place)
     system, look, parts = told.history.ids[row], told.looks[row], told.parts_at_the_end()
     leads, left = system in parts.leaders, system in parts.left_behind
-    said = f"{robots([system])}: {look}{', leads' if leads else ''}{', left behind' if left else ''}"
-    class_ = f"place {look}{' left' if left else ''}"
     if look == "failed":
         shape = f"M{x - 4:.1f},{y - 4:.1f}l8,8m0,-8l-8,8"
     elif leads:
         shape = f"M{x:.1f},{y - 5:.1f}l4.6,8h-9.2Z"
     else:
         shape = f"M{x - 3:.1f},{y:.1f}a3,3 0 1 0 6,0a3,3 0 1 0 -6,0Z"
-    marks = [element("path", hover(said), d=shape, class_=class_)]
-    if not told.crowded or look != "healthy":
-        marks.append(words(x + 6, y - 3, str(system), f"name {look}"))
-    return marks
+    said = f"{robots([system])}: {look}{', leads' if leads else ''}{', left behind' if left else ''}"
+    return element("path", hover(said), d=shape, class_=f"place {look}{' left' if left else ''}")
 
 
-def _plan(told: Told, ground: Ground) -> list[str]:
-    """Legs, what an emergency call cut off, and a star at every target."""
+def _numbers(told: Told, ground: Ground, last: Array, seen: Sequence[int]) -> list[str]:
+    """Beside each robot, away from the others' middle; in a crowd only of those that matter."""
+    middle = np.array([ground.at(place) for place in last[list(seen)]]).mean(axis=0) if seen else np.zeros(2)
     parts = []
-    for segment in told.plan.segments:
+    for row in seen:
+        if told.crowded and told.looks[row] == "healthy":
+            continue
+        at = np.array(ground.at(last[row]))
+        away = (at - middle) / max(float(np.hypot(*(at - middle))), 1e-9)
+        x, y = at + AWAY * (away if np.hypot(*away) > 0.5 else np.array([1.0, 0.0]))
+        parts.append(words(x, y + 0.35 * TEXT, str(told.history.ids[row]), f"name {told.looks[row]}", anchor="middle"))
+    return parts
+
+
+AWAY = 12.0
+"""Units from a robot to its number."""
+
+
+def _plan(told: Told, ground: Ground, flown: Array) -> list[str]:
+    """Legs, what an emergency call cut off, and a star at every target. flown: (K, 2) units that are drawn upon."""
+    parts, stars = [], []
+    segments = told.plan.segments
+    for segment in segments:
         parts.append(ground.way(np.array([segment.end_ne, segment.planned_end_ne]), "cut"))
         parts.append(ground.way(np.array([segment.start_ne, segment.end_ne]), "plan"))
-    for number, segment in enumerate(told.plan.segments, start=1):
-        last = number == len(told.plan.segments)
+    for number, segment in enumerate(segments, start=1):
         x, y = ground.at(segment.planned_end_ne)
-        parts.append(element("path", hover(f"target {number}: {segment.task}"), d=_star(x, y), class_=f"target {'last' if last else 'passed'}"))
-        parts.append(_task(ground, x, y, segment.task))
-    return parts
+        class_ = f"target {'last' if number == len(segments) else 'passed'}"
+        stars.append(element("path", hover(f"target {number}: {segment.task}"), d=_star(x, y), class_=class_))
+        if len(segments) <= MOST_TASKS or number == len(segments):
+            stars.append(_task(ground, x, y, segment.task, flown))
+    return parts + stars
 
 
 LONGEST_TASK = 26
 """Letters of a task on the map."""
+MOST_TASKS = 6
+"""Named on the map; of more, only the last."""
 
 
-def _task(ground: Ground, x: float, y: float, task: str) -> str:
-    """Its name beside a target, on the side where there is room for it."""
+def _task(ground: Ground, x: float, y: float, task: str, flown: Array) -> str:
+    """Its name beside, above or below a target: where least is drawn that it would cover."""
     said = task if len(task) <= LONGEST_TASK else task[: LONGEST_TASK - 1] + "…"
     width = LETTER * len(said)
-    left = max(ground.east.start + 2, min(x - width / 2, ground.east.end - width))
-    above = y - 12 if y - 12 - TEXT > ground.north.end else y + 10 + TEXT
-    return words(left, above, said, "task")
+    west, east = ground.east.start + 2, ground.east.end
+    places = [(x + 12, y + 4, "start"), (x - 12, y + 4, "end")]
+    for base in (y - 12, y + 19):
+        if ground.north.end + TEXT < base < ground.north.start:
+            beyond = "end" if x + width / 2 > east else "start" if x - width / 2 < west else "middle"
+            places.append(({"end": east, "start": west, "middle": x}[beyond], base, beyond))
+
+    def covered(place: tuple[float, float, str]) -> int:
+        at, base, anchor = place
+        left = at - width * {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor]
+        inside = (flown > (left - 2, base - TEXT)) & (flown < (left + width + 2, base + 4))
+        outside = left < west or left + width > east
+        return int(inside.all(axis=1).sum()) + MUCH * outside
+
+    at, base, anchor = min(places, key=covered)
+    return words(at, base, said, "task", anchor=anchor)
+
+
+MUCH = 10**6
+"""Points: worse than to cover all that is drawn."""
 
 
 def _star(x: float, y: float) -> str:
     """Five points."""
     angle = np.arange(10) * np.pi / 5
     radius = np.where(np.arange(10) % 2 == 0, 8.0, 3.4)
-    return "M" + "L".join(f"{x + r * np.sin(a):.1f},{y - r * np.cos(a):.1f}" for a, r in zip(angle, radius, strict=True)) + "Z"
+    points = zip(x + radius * np.sin(angle), y - radius * np.cos(angle), strict=True)
+    return "M" + "L".join(f"{across:.1f},{down:.1f}" for across, down in points) + "Z"
 
 
 def _in_words(told: Told) -> str:
     if not told.mission.size:
         return "The mission never began."
-    heading = told.plan.segments[-1].task
+    sent = f"Sent to “{told.plan.segments[-1].task}”"
     if told.score is None:
-        return f"Sent to {heading!r}; the flight ended before its read-out."
-    return f"Sent to “{heading}”; the healthy robots' mean ended {told.score.distance_to_target_m:.1f} m from it."
+        return f"{sent}; the flight ended before its read-out."
+    return f"{sent}; the healthy robots' mean ended {told.score.distance_to_target_m:.1f} m from it."

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from gcs.mission import Plan
 from gcs.report.axes import Frame, framed
-from gcs.report.robots import Drawn, Section, line, names, swarm
+from gcs.report.robots import Drawn, Section, key, line, names, swarm
 from gcs.report.series import closest_pair, distance_to_target, off_course_deg
 from gcs.report.svg import Label, element
 from gcs.report.told import Told
@@ -21,7 +21,6 @@ Array = npt.NDArray[np.float64]
 MOST_LEGS = 4
 """Whose beginnings are all marked; of more, only the last and those that were called."""
 MEAN = ("mean", "mean of the healthy robots: what is judged")
-EACH = (("robot healthy", "each healthy robot"), ("robot failed", "failed robot"), ("robot doubted", "healthy, but distrusted"))
 ALLOWED = ("limit", "allowed")
 
 
@@ -43,13 +42,15 @@ def heading(flights: Sequence[Told]) -> Section:
                 f"{told.score.heading_error_deg:.1f}° at the read-out, allowed {allowed:g}°; "
                 f"with every robot counted {told.score.swarm_heading_error_deg:.1f}°."
             )
-        drawn.append(_judged(told, flights, each, mean, (0.0, min(top, 180.0)), allowed, "degrees", "Heading error", words))
+        drawn.append(
+            _judged(told, flights, each, mean, (0.0, min(top, 180.0)), allowed, "degrees", "Heading error", words)
+        )
     return Section(
         "heading",
         "Heading error",
-        "The angle between the leg and the way flown since the leg began. Just after a turn it is large, because the "
-        "swarm still swings round; what counts is where the black line ends.",
-        (MEAN, *EACH, ALLOWED),
+        "The angle between the leg and the way flown since the leg began. Just after a turn it leaves the chart, for "
+        "the swarm still swings round; what counts is the dot, where the line of the mean ends.",
+        (MEAN, *key(flights), ALLOWED),
         tuple(drawn),
     )
 
@@ -66,13 +67,15 @@ def distance(flights: Sequence[Told]) -> Section:
             words = f"The flight ended before its read-out, {_last(mean):.1f} m from its target."
         if told.score is not None:
             words = f"{told.score.distance_to_target_m:.1f} m at the read-out, allowed {allowed:g} m."
-        drawn.append(_judged(told, flights, each, mean, (0.0, 1.05 * top), allowed, "metres", "Distance to target", words))
+        drawn.append(
+            _judged(told, flights, each, mean, (0.0, 1.05 * top), allowed, "metres", "Distance to target", words)
+        )
     return Section(
         "distance",
         "Distance to the target",
-        "From the target of the leg being flown to the mean of the healthy robots. It jumps when a new target is given; "
-        "a swarm on its way falls in a straight line and ends below the dashed one.",
-        (MEAN, *EACH, ALLOWED),
+        "From the target of the leg being flown to the mean of the healthy robots. It jumps when a new target is "
+        "given; a swarm on its way falls in a straight line and ends below the dashed one.",
+        (MEAN, *key(flights), ALLOWED),
         tuple(drawn),
     )
 
@@ -157,7 +160,7 @@ def _judged(
         element("circle", cx=x, cy=y, r=3.5, class_="end"),
     ]
     svg = framed(
-        frame, parts, title=title, description=words, unit=unit, marks=marks(told), names=names(told, each)
+        frame, parts, title=title, description=words, unit=unit, marks=marks(told), names=names(frame, told, each)
     )
     return Drawn(svg, words)
 

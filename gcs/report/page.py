@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -47,10 +48,15 @@ def page(histories: Sequence[History]) -> str:
     flights = [Told(name, history) for name, history in zip(_names(histories), histories, strict=True)]
     titles = list(dict.fromkeys(history.scenario.title for history in histories))
     surroundings = Environment(
-        loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(Path(__file__).parent),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     surroundings.filters["svg"] = Markup  # charts escape their own words
     surroundings.filters["key"] = _key
+    surroundings.filters["units"] = _with_units
     return surroundings.get_template("page.html.jinja").render(
         title=titles[0] if len(titles) == 1 else f"{len(histories)} flights of {len(titles)} scenarios",
         columns=len(flights) if len(flights) <= 3 else 2 if len(flights) == 4 else 3,
@@ -63,7 +69,9 @@ def page(histories: Sequence[History]) -> str:
 
 def _account(told: Told) -> Account:
     history = told.history
-    facts = {"scenario": history.metadata.get("scenario", ""), "recording": str(history.path.resolve())} | dict(history.metadata)
+    facts = {"scenario": history.metadata.get("scenario", ""), "recording": str(history.path.resolve())} | dict(
+        history.metadata
+    )
     return Account(
         name=told.name,
         passed=told.passed,
@@ -79,12 +87,14 @@ def _names(histories: Sequence[History]) -> list[str]:
     """How flights are called: by their controller, and by as much more as tells them apart."""
     number = {id(history): str(place) for place, history in enumerate(histories, start=1)}
     more: tuple[Callable[[History], str], ...] = (
-        lambda history: history.metadata.get("scenario", ""),
         lambda history: f"seed {history.metadata['seed']}" if history.metadata.get("seed") else "",
         lambda history: history.path.resolve().parent.name,
         lambda history: f"flight {number[id(history)]}",
     )
     names = [controller_name(history.scenario) for history in histories]
+    scenarios = [Path(history.metadata.get("scenario", "")).stem for history in histories]
+    if len(set(scenarios)) > 1:
+        names = [f"{scenario}: {name}" for scenario, name in zip(scenarios, names, strict=True)]
     for tell in more:
         twice = {name for name in names if names.count(name) > 1}
         for name in twice:
@@ -102,7 +112,11 @@ MOST_DIFFERENCES = 12
 def _differences(flights: Sequence[Told]) -> Table | None:
     """Keys of the scenarios that are not the same in all flights; None where there are none."""
     flat = [dict(_flat(told.history.scenario.model_dump(mode="json"))) for told in flights]
-    keys = [key for key in dict.fromkeys(key for one in flat for key in one) if len({repr(one.get(key)) for one in flat}) > 1]
+    keys = [
+        key
+        for key in dict.fromkeys(key for one in flat for key in one)
+        if len({repr(one.get(key)) for one in flat}) > 1
+    ]
     if not keys:
         return None
     rows = tuple(Row(key, tuple(Cell(_said(one.get(key))) for one in flat)) for key in keys[:MOST_DIFFERENCES])
@@ -128,6 +142,11 @@ def _said(value: Any) -> str:
     return "–" if value is None else str(value)
 
 
+def _with_units(said: str) -> str:
+    """Numbers keep their units on their line."""
+    return re.sub(r"(?<=\d) (?=(s|ms|m|of 5)\b)", "\u00a0", said)
+
+
 def _key(class_: str) -> Markup:
     """A sample of how a thing is drawn."""
     if class_.endswith("bar"):
@@ -139,4 +158,3 @@ def _key(class_: str) -> Markup:
     else:
         drawn = element("line", x1=1, x2=21, y1=5.5, y2=5.5, class_=class_)
     return Markup(element("svg", drawn, viewBox="0 0 22 11", class_="key", aria_hidden="true"))
-

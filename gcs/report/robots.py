@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,32 +39,58 @@ class Section:
     charts: tuple[Drawn, ...]
     """In the order of the flights."""
 
+    @property
+    def drawn(self) -> bool:
+        """Whether there is anything but words."""
+        return any(chart.svg for chart in self.charts)
+
+
+def key(flights: Sequence[Told]) -> tuple[tuple[str, str], ...]:
+    """How robots are drawn, as far as there are such."""
+    found = {look for told in flights for look in told.looks}
+    healthy = ("robot healthy", "each healthy robot")
+    if any(told.crowded for told in flights):
+        healthy = ("band bar", "all healthy robots lie within, the line is their median")
+    named = (("failed", "failed robot"), ("doubted", "healthy, but distrusted"))
+    return (healthy, *((f"robot {look}", words) for look, words in named if look in found))
+
 
 def swarm(frame: Frame, told: Told, rows: Rows, values: Array) -> list[str]:
     """Values (len(rows), N) of every robot over these rows; those that matter most on top."""
-    time = told.since_s[rows]
     order = sorted(range(told.count), key=lambda row: ("healthy", "doubted", "failed").index(told.looks[row]))
     crowd = [row for row in order if told.looks[row] == "healthy"] if told.crowded else []
     drawn = _band(frame, told, rows, values[:, crowd]) if crowd else []
     for row in order:
         if row not in crowd:
-            drawn.append(line(frame, told, rows, values[:, row], f"robot {told.looks[row]}", title=robots([told.history.ids[row]])))
-    return drawn if time.size else []
+            class_, title = f"robot {told.looks[row]}", robots([told.history.ids[row]])
+            drawn.append(line(frame, told, rows, values[:, row], class_, title=title))
+    return drawn
 
 
 def line(frame: Frame, told: Told, rows: Rows, values: Array, class_: str, *, title: str = "") -> str:
     """One line over these rows, broken where ticks are missing."""
     time, drawn = _broken(told, rows, told.since_s[rows]), _broken(told, rows, values)
-    return path(frame.time(time), frame.value.within(drawn), class_, title)
+    return path(frame.time(time), frame.value(_shown(frame, drawn)), class_, title)
 
 
-def names(told: Told, values: Array) -> list[Label]:
+def _shown(frame: Frame, values: Array) -> Array:
+    """Values as far as they lie inside the plot: a line that leaves it ends at its edge."""
+    inside = (values >= frame.value.low) & (values <= frame.value.high)
+    beside = inside.copy()
+    beside[1:] |= inside[:-1]
+    beside[:-1] |= inside[1:]
+    return np.where(beside, np.clip(values, frame.value.low, frame.value.high), np.nan)
+
+
+def names(frame: Frame, told: Told, values: Array) -> list[Label]:
     """Of the robots that failed or were doubted, at their last values. values: (T, N)."""
     found = []
     for row, look in enumerate(told.looks):
         known = np.flatnonzero(np.isfinite(values[:, row]))
         if look != "healthy" and known.size:
-            found.append(Label(float(values[known[-1], row]), str(told.history.ids[row]), look))
+            last = float(values[known[-1], row])
+            beyond = " ↑" if last > frame.value.high else ""
+            found.append(Label(last, f"{told.history.ids[row]}{beyond}", look))
     return found
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
-from gcs.mission import Plan
+from gcs.mission import Plan, Segment
 from gcs.recording.history import Links
 
 Array = npt.NDArray[np.float64]
@@ -40,19 +41,19 @@ def distance_to_target(time_s: Array, place_ne: Array, plan: Plan) -> Array:
     return away
 
 
-def heeded(weights: Array) -> Array:
-    """(T, N) how much each robot is heeded: the mean over all robots of the weight they give it; 1/N is an equal share.
+def heeded(weights: Array, by: npt.NDArray[np.bool_]) -> Array:
+    """(T, N) how much each robot is heeded: the mean of the weights that some robots give it; 1/N is an equal share.
 
-    weights: (T, N, N) as in the recording, NaN where no control law ran.
+    weights: (T, N, N) as in the recording, NaN where no control law ran;  by: (N,) whose weights count.
     """
-    return np.asarray(weights.mean(axis=1))
+    return np.asarray(weights[:, by].mean(axis=1), np.float64)
 
 
 def lost_share(links: Links) -> Array:
-    """(L − 1, N) of the frames sent between two moments, the share that did not come; NaN where none was sent."""
+    """(L − 1, N) of the frames sent between two moments, the share that did not come; 0 where none was sent."""
     lost = np.maximum(np.diff(links.lost, axis=0), 0)
     due = lost + np.maximum(np.diff(links.received, axis=0), 0)
-    return np.divide(lost, due, out=np.full(lost.shape, np.nan), where=due > 0)
+    return np.asarray(lost / np.maximum(due, 1))
 
 
 def closest_pair(position: Array) -> tuple[int, int]:
@@ -63,7 +64,7 @@ def closest_pair(position: Array) -> tuple[int, int]:
     return int(min(first, second)), int(max(first, second))
 
 
-def _legs(time_s: Array, plan: Plan):  # type: ignore[no-untyped-def]
+def _legs(time_s: Array, plan: Plan) -> Iterator[tuple[slice, Segment]]:
     """The rows of each leg that was begun, and the leg."""
     begins = [int(np.searchsorted(time_s, segment.begins_s - 1e-9)) for segment in plan.segments]
     for (begin, end), segment in zip(pairwise([*begins, len(time_s)]), plan.segments, strict=True):

@@ -11,10 +11,11 @@ import numpy as np
 
 from gcs.events import Rating
 from gcs.flight_state import Phase
+from gcs.gate import LOST_NS
 from gcs.recording.happenings import Kind
 from gcs.report.series import heeded
 from gcs.report.told import Told
-from gcs.scoring import DISTRUSTED
+from gcs.scoring import AIRBORNE, DISTRUSTED
 from gcs.words import controller_name, robots
 
 MOST = 12
@@ -23,7 +24,7 @@ ALWAYS, OFTEN, SELDOM = 0, 1, 2
 """How soon a sentence goes when there are too many: SELDOM ones first."""
 FEW = 4
 """Things of a kind that are told one by one."""
-NUMBERS = "No One Two Three Four Five Six Seven Eight Nine Ten Eleven Twelve".split()
+NUMBERS = ["No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten", "Eleven", "Twelve"]
 WHENCE = {
     "truth": "it was told by the simulation who fails",
     "auto": "whom to trust, the swarm had to find out from behaviour alone",
@@ -56,18 +57,20 @@ def _beginning(told: Told) -> Iterator[Sentence]:
     many = _many(told.count)
     climbs = _first(told, Phase.CLIMB)
     if climbs is None:
-        yield Sentence(-math.inf, ALWAYS, f"{many} {'was' if told.count == 1 else 'were'} waited for, and never took off.")
+        yield Sentence(
+            -math.inf, ALWAYS, f"{many} {'was' if told.count == 1 else 'were'} waited for, and never took off."
+        )
         return
-    up = next((row for row in map(lambda phase: _first(told, phase), (Phase.TAKE_CONTROL, Phase.RUN_UP, Phase.MISSION)) if row), None)
+    up = next(filter(None, (_first(told, phase) for phase in (Phase.TAKE_CONTROL, Phase.RUN_UP, Phase.MISSION))), None)
     height = f"{history.scenario.swarm.altitude_m:g} m up"
     climbed = f"; {told.since_s[up] - told.since_s[climbs]:.1f} s later all were {height}" if up else ""
     if told.count == 1 and up:
         climbed = f" and was {height} {told.since_s[up] - told.since_s[climbs]:.1f} s later"
     yield Sentence(-math.inf, ALWAYS, f"{many} took off{climbed}.")
-    whence = WHENCE.get(told.trust_source or "", "which asks nobody whom to trust")
+    whence = f": {WHENCE[told.trust_source]}" if told.trust_source else ", which asks for no trust"
     if told.trust_source == "ratings" and not history.ratings and not history.metadata.get("ratings"):
-        whence = "it trusted as people did on average in the user study"
-    yield Sentence(-math.inf, ALWAYS, f"The controller was {_lower(controller_name(history.scenario))}: {whence}.")
+        whence = ": it trusted as people did on average in the user study"
+    yield Sentence(-math.inf, ALWAYS, f"The controller was {_lower(controller_name(history.scenario))}{whence}.")
 
 
 def _mission(told: Told) -> Iterator[Sentence]:
@@ -94,7 +97,9 @@ def _tasks(told: Told) -> Iterator[Sentence]:
         if at_s > reached_s + 1e-9:
             return
         if any(math.isclose(at_s, call) for call in calls):
-            yield Sentence(at_s, ALWAYS, f"At {at_s:.1f} s an emergency call broke off “{before.task}”: on to “{segment.task}”.")
+            yield Sentence(
+                at_s, ALWAYS, f"At {at_s:.1f} s an emergency call broke off “{before.task}”: on to “{segment.task}”."
+            )
         else:
             yield Sentence(at_s, OFTEN, f"At {at_s:.1f} s it was time for “{segment.task}”.")
 
@@ -109,7 +114,7 @@ def _faults(told: Told) -> Iterator[Sentence]:
         yield Sentence(0.0, ALWAYS, f"Something was wrong from the start, and no controller was told: {said}{more}.")
     for said, at_s in firsts.items():
         if at_s > 0.0:
-            yield Sentence(at_s, OFTEN, f"At {at_s:.1f} s something went wrong: {_without_brackets(said)}.")
+            yield Sentence(at_s, OFTEN, f"At {at_s:.1f} s something went wrong: {said}.")
     if not firsts and not told.history.measured:
         yield Sentence(0.0, SELDOM, "Nothing was wrong with anybody.")
 
@@ -126,11 +131,14 @@ def _distrust(told: Told) -> Iterator[Sentence]:
         onset_s = min(spans, default=math.inf)
         if look == "doubted" or at_s < onset_s - 1e-9:
             again = " and trusted again later" if trust[-1, column] >= DISTRUSTED else ""
-            yield Sentence(at_s, OFTEN, f"At {at_s:.1f} s robot {system} was distrusted though nothing was wrong with it{again}.")
+            yield Sentence(
+                at_s, OFTEN, f"At {at_s:.1f} s robot {system} was distrusted though nothing was wrong with it{again}."
+            )
         elif at_s - onset_s < 1e-6:
             yield Sentence(at_s, ALWAYS, f"Robot {system} was distrusted at once.")
         else:
-            yield Sentence(at_s, ALWAYS, f"At {at_s:.1f} s, {at_s - onset_s:.1f} s after that began, trust in robot {system} fell below one half.")
+            after = f", {at_s - onset_s:.1f} s after its fault began" if onset_s > 0.0 else ""
+            yield Sentence(at_s, ALWAYS, f"At {at_s:.1f} s{after}, trust in robot {system} fell below one half.")
 
 
 def _missed(told: Told) -> Iterator[Sentence]:
@@ -170,38 +178,40 @@ def _ratings(told: Told) -> Iterator[Sentence]:
     if len(said) <= FEW:
         for rater, of_one in groupby(sorted(said, key=lambda rating: rating.rater), key=lambda rating: rating.rater):
             given = list(of_one)
-            yield Sentence(given[0].time_s or 0.0, OFTEN, f"{rater} rated {_listed([_given(rating) for rating in given])}.")
+            yield Sentence(
+                given[0].time_s or 0.0, OFTEN, f"{rater} gave {_listed([_given(rating) for rating in given])}."
+            )
         return
     who = raters[0] if len(raters) == 1 else f"{len(raters)} people"
     means = {
         system: float(np.mean([rating.rating for rating in said if rating.vehicle == system]))
         for system in sorted({rating.vehicle for rating in said if rating.vehicle is not None})
     }
-    worst = f"; robot {min(means, key=means.__getitem__)} came off worst, {min(means.values()):.1f} of 5 on average" if means else ""
+    worst = (
+        f"; robot {min(means, key=means.__getitem__)} came off worst, {min(means.values()):.1f} of 5 on average"
+        if means
+        else ""
+    )
     yield Sentence(first_s, OFTEN, f"From {first_s:.1f} s on {who} gave {len(said)} ratings{worst}.")
 
 
 def _given(rating: Rating) -> str:
     whom = "the swarm" if rating.vehicle is None else f"robot {rating.vehicle}"
-    return f"{whom} {rating.rating} of 5 at {rating.time_s:.1f} s"
+    return f"{rating.rating} of 5 to {whom} at {rating.time_s:.1f} s"
 
 
 def _silences(told: Told) -> Iterator[Sentence]:
-    """Who was not heard any more."""
-    silent = [one for one in told.history.happenings if one.kind is Kind.LINK and "silent" in one.words]
-    whom = sorted({one.vehicle for one in silent if one.vehicle is not None})
-    if not whom:
+    """Who was not heard any more, and who came back."""
+    about = [one for one in told.history.happenings if one.kind is Kind.LINK and one.vehicle is not None]
+    if not about:
         return
-    at_s = float(told.since_s[silent[0].tick])
-    again = {one.vehicle for one in told.history.happenings if one.kind is Kind.LINK} - set(_silent_at_the_end(told))
-    heard = "" if not again else ", and was heard again" if len(whom) == 1 else f"; {_listed([str(one) for one in sorted(again & set(whom))])} came back"
-    first = f"At {at_s:.1f} s" if len(whom) == 1 else f"From {at_s:.1f} s on"
+    whom = sorted({one.vehicle for one in about if one.vehicle is not None})
+    mute = told.history.age_s[-1] > LOST_NS / 1e9
+    back = [system for system, silent in zip(told.history.ids, mute, strict=True) if system in whom and not silent]
+    at_s = float(told.since_s[about[0].tick])
+    first = f"At {at_s:.1f} s" if len(about) <= 2 else f"From {at_s:.1f} s on"
+    heard = "" if not back else ", for a while" if back == whom else f"; {robots(back)} came back"
     yield Sentence(at_s, ALWAYS, f"{first} {robots(whom)} fell silent{heard}.")
-
-
-def _silent_at_the_end(told: Told) -> list[int]:
-    last = {one.vehicle: one.words for one in told.history.happenings if one.kind is Kind.LINK and one.vehicle}
-    return [system for system, words in last.items() if system is not None and "silent" in words]
 
 
 def _operator(told: Told) -> Iterator[Sentence]:
@@ -222,16 +232,21 @@ def _end(told: Told) -> Iterator[Sentence]:
         return
     lasted_s = told.since_s[-1] - told.since_s[0]
     if history.phase[-1] == Phase.DONE.value:
-        yield Sentence(math.inf, ALWAYS, f"All was over {lasted_s:.1f} s after it began{_down(told)}.")
+        yield Sentence(math.inf, ALWAYS, f"All was over after {lasted_s:.1f} s{_down(told)}.")
     elif history.problem is None:
         yield Sentence(math.inf, ALWAYS, f"The recording ends after {lasted_s:.1f} s, {history.phase[-1]}.")
 
 
 def _down(told: Told) -> str:
-    armed = [system for system, on in zip(told.history.ids, told.history.armed[-1], strict=True) if on]
-    if _first(told, Phase.CLIMB) is None:
+    """Who was back on the ground, where that is known."""
+    up = [
+        system
+        for system, height in zip(told.history.ids, told.history.position[-1, :, 2], strict=True)
+        if height >= AIRBORNE
+    ]
+    if _first(told, Phase.CLIMB) is None or not np.isfinite(told.history.position[-1]).all():
         return ""
-    return f"; {robots(armed)} still had rotors running" if armed else ", everyone landed and disarmed"
+    return f"; {robots(up)} still in the air" if up else ", everyone back on the ground"
 
 
 def _heeded(told: Told) -> Iterator[Sentence]:
@@ -239,24 +254,32 @@ def _heeded(told: Told) -> Iterator[Sentence]:
     failed = [row for row, look in enumerate(told.looks) if look == "failed"]
     if not failed or not told.mission.size or told.count < 2:
         return
-    share = heeded(told.history.weights[told.mission[-1:]])[0, failed]
-    if not np.isfinite(share).all():
+    history = told.history
+    ruled = told.mission[np.isfinite(history.weights[told.mission]).all(axis=(1, 2))]
+    last_leg = ruled[history.mission_s[ruled] >= told.plan.hand_over_s]
+    if not last_leg.size:
         return
-    whom = robots([told.history.ids[row] for row in failed]) if len(failed) <= FEW else f"the {len(failed)} failed robots"
+    share = heeded(history.weights[last_leg], told.scored).mean(axis=0)[failed]
+    whom = robots([history.ids[row] for row in failed]) if len(failed) <= FEW else f"the {len(failed)} failed robots"
     equal = 1.0 / told.count
     most = float(share.max())
     if most >= 0.8 * equal:
-        said = f"To the end {whom} counted for as much as anybody, {most:.0%} of what is heeded."
+        said = f"On the last leg {whom} counted for as much as anybody: {most:.1%} of what is heeded."
     else:
-        said = f"By the end {whom} counted for {most:.1%} of what is heeded, where an equal share is {equal:.0%}."
-    yield Sentence(told.plan.read_out_s, SELDOM, said)
+        counted = "next to nothing" if most < 0.001 else f"{most:.1%} of what is heeded"
+        said = f"On the last leg {whom} counted for {counted}, where an equal share is {equal:.1%}."
+    yield Sentence(told.plan.read_out_s, ALWAYS, said)
 
 
 def _judged(told: Told) -> Sentence:
     score, expect = told.score, told.history.scenario.expect
     assert score is not None
     close = score.min_separation_m
-    apart = "" if close >= expect.min_separation_m else f", and robots had come within {close:.2f} m of each other (allowed {expect.min_separation_m:g} m)"
+    apart = (
+        ""
+        if close >= expect.min_separation_m
+        else f", and robots had come within {close:.2f} m of each other (allowed {expect.min_separation_m:g} m)"
+    )
     return Sentence(
         told.plan.read_out_s,
         ALWAYS,
@@ -283,7 +306,3 @@ def _listed(things: Sequence[str]) -> str:
 def _lower(name: str) -> str:
     """In the middle of a sentence: names of people and of rules keep their capitals."""
     return "the " + name[0].lower() + name[1:] if name.startswith(("Averaged", "Coordinate")) else name
-
-
-def _without_brackets(said: str) -> str:
-    return said.split(" (")[0]

@@ -1,4 +1,4 @@
-"""Charts as SVG text: elements, lines thinned out without losing a spike, and labels that keep out of each other's way."""
+"""Charts as SVG text: elements, lines thinned out without losing a spike, labels that make way for each other."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ Array = npt.NDArray[np.float64]
 
 TEXT = 11.0
 """Height of a letter's line, in units of a chart: the pixels of a phone."""
-LETTER = 0.58 * TEXT
-"""Width of a letter, on average and rounded up."""
+LETTER = 0.54 * TEXT
+"""Width of a letter, on average."""
 TOLERANCE = 0.12
 """Units by which a thinned line may miss what it was drawn from."""
 COLUMN = 0.5
@@ -33,7 +33,9 @@ def element(name: str, content: str = "", /, **attributes: object) -> str:
 
 def words(x: float, y: float, said: str, class_: str = "", *, anchor: str = "start") -> str:
     """A line of text, escaped, its base line at y."""
-    return element("text", escape(said), x=x, y=y, class_=class_ or None, text_anchor=None if anchor == "start" else anchor)
+    return element(
+        "text", escape(said), x=x, y=y, class_=class_ or None, text_anchor=None if anchor == "start" else anchor
+    )
 
 
 def hover(said: str) -> str:
@@ -42,10 +44,8 @@ def hover(said: str) -> str:
 
 
 def path(x: Array, y: Array, class_: str, title: str = "", **attributes: object) -> str:
-    """A line through points (T,) and (T,) in units of the chart, broken where either is NaN; "" where nothing is left."""
-    drawn = "".join(
-        "M" + "L".join(f"{_number(a)},{_number(b)}" for a, b in piece.tolist()) for piece in _pieces(x, y)
-    )
+    """A line through points (T,) and (T,) in units of the chart, broken where either is NaN; "" of no points."""
+    drawn = "".join("M" + "L".join(f"{_number(a)},{_number(b)}" for a, b in piece.tolist()) for piece in _pieces(x, y))
     if not drawn:
         return ""
     return element("path", hover(title) if title else "", class_=class_, d=drawn, **attributes)
@@ -69,7 +69,10 @@ def thinned(x: Array, y: Array) -> Array:
     points = _fewer(np.column_stack([x, y]))
     keep = np.zeros(len(points), bool)
     keep[[0, -1, int(points[:, 1].argmin()), int(points[:, 1].argmax())]] = True
-    spans = [(int(a), int(b)) for a, b in zip(*(np.flatnonzero(keep)[part] for part in (slice(-1), slice(1, None))), strict=True)]
+    spans = [
+        (int(a), int(b))
+        for a, b in zip(*(np.flatnonzero(keep)[part] for part in (slice(-1), slice(1, None))), strict=True)
+    ]
     while spans:
         first, last = spans.pop()
         if last - first < 2:
@@ -153,7 +156,7 @@ def apart(wanted: Sequence[float], *, least: float, low: float, high: float) -> 
 
 
 def in_lanes(labels: Sequence[Label], *, low: float, high: float) -> list[tuple[int, float]]:
-    """(lane, left edge) of each label: as near to its place as it stays inside, in the first lane that is free there."""
+    """(lane, left edge) of each label: as near to its place as it stays inside, in the first lane free there."""
     taken: list[list[tuple[float, float]]] = []
     placed = [(0, low)] * len(labels)
     for index in sorted(range(len(labels)), key=lambda index: labels[index].at):

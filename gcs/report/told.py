@@ -59,7 +59,7 @@ class Told:
 
     @cached_property
     def since_s(self) -> Array:
-        """(T,) since mission start, before and after it too; since the recording's first tick if there was no mission."""
+        """(T,) since mission start, before and after it too; since the first tick if there was no mission."""
         history = self.history
         known = np.flatnonzero(np.isfinite(history.mission_s))
         start_ns = history.time_ns[0] if len(history.time_ns) else 0
@@ -86,13 +86,12 @@ class Told:
     @cached_property
     def looks(self) -> tuple[str, ...]:
         """(N,) how each is drawn: failed, doubted (distrusted without a fault of its own) or healthy."""
-        healthy = healthy_robots(self.history.scenario)
-        doubted = np.zeros(self.count, bool)
+        trusted = np.ones(self.count, bool)
         if self.trust_source is not None:
-            doubted = (self.history.trust[self.mission] < DISTRUSTED).any(axis=0)
+            trusted = ~np.any(self.history.trust[self.mission] < DISTRUSTED, axis=0)
+        sound = zip(healthy_robots(self.history.scenario).tolist(), trusted.tolist(), strict=True)
         return tuple(
-            "failed" if not sound else "doubted" if doubts else "healthy"
-            for sound, doubts in zip(healthy, doubted, strict=True)
+            "failed" if not healthy else "healthy" if is_trusted else "doubted" for healthy, is_trusted in sound
         )
 
     @property

@@ -32,6 +32,8 @@ class Row:
 
     name: str
     cells: tuple[Cell, ...]
+    note: str = ""
+    """Under its name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +46,20 @@ class Table:
 
 def verdicts(flights: Sequence[Told]) -> Table:
     """How each flight ended: what it was judged by against what was allowed."""
-    headings = ("flight", "verdict", "heading error", "to the target", "closest two", "what went wrong", "distrusted after", "left behind")
-    return Table(headings, tuple(Row(told.name, _verdict(told)) for told in flights))
+    headings = (
+        "flight",
+        "verdict",
+        "heading error",
+        "to the target",
+        "closest two",
+        "what went wrong",
+        "distrusted after",
+        "left behind",
+    )
+    titles = [told.history.scenario.title for told in flights]
+    notes = titles if len(set(titles)) > 1 else [""] * len(titles)
+    rows = (Row(told.name, _verdict(told), note) for told, note in zip(flights, notes, strict=True))
+    return Table(headings, tuple(rows))
 
 
 def _verdict(told: Told) -> tuple[Cell, ...]:
@@ -106,10 +120,19 @@ def _distrusted(told: Told) -> Cell:
 
 def robot_by_robot(told: Told) -> Table:
     """Figures of each robot, beside its lines."""
-    headings = ("robot", "part", "trust, least", "trust, last", "heeded, last", "battery, last", "telemetry, oldest", "set-points changed")
+    headings = (
+        "robot",
+        "part",
+        "trust, least",
+        "trust, last",
+        "heeded, last",
+        "battery, last",
+        "telemetry, oldest",
+        "set-points changed",
+    )
     history, rows = told.history, told.mission
     trust = history.trust[rows] if told.trust_source is not None else np.full((len(rows), told.count), np.nan)
-    share = heeded(history.weights[rows])
+    share = heeded(history.weights[rows], told.scored)
     parts = told.parts_at_the_end()
     table = []
     for row, system in enumerate(history.ids):
