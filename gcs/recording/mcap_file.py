@@ -21,10 +21,12 @@ from mcap.opcode import Opcode
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK_BYTES = 1 << 20
 """A chunk that holds as much is closed, however young: readers hold one in memory."""
+TOLD_AGAIN_BYTES = 1 << 19
+"""After so many a chunk repeats all schemas and channels: one that is damaged takes nobody's name along."""
 _MESSAGE = struct.Struct("<BQHIQQ")
 """Opcode, length of what follows, channel, sequence, log time, publish time."""
-_MESSAGE_HEAD = 22
-"""Bytes of a message's length that are not its payload."""
+_OPCODE, _HEAD = int(Opcode.MESSAGE), 22
+"""Of a message, and the bytes of its length that are not its payload."""
 _FOOTER, _FOOTER_LENGTH = struct.Struct("<BQQQ"), 20
 """What the summary's CRC covers of the footer: its opcode, its length and two places."""
 
@@ -50,6 +52,8 @@ class McapFile:
         self._attachments: list[records.AttachmentIndex] = []
         self._metadata: list[records.MetadataIndex] = []
         self._chunks: list[records.ChunkIndex] = []
+        self._told_at = 0
+        """Where schemas and channels were last told, all of them."""
         self._begin()
         try:
             self._write(MAGIC + _packed(records.Header(profile="", library=library)))
@@ -92,7 +96,7 @@ class McapFile:
         if index is None:
             index = self._indexes[channel] = []
         index += (time_ns, self._size)
-        self._pieces += (_MESSAGE.pack(Opcode.MESSAGE, _MESSAGE_HEAD + len(data), channel, 0, time_ns, time_ns), data)
+        self._pieces += (_MESSAGE.pack(_OPCODE, _HEAD + len(data), channel, 0, time_ns, time_ns), data)
         self._size += _MESSAGE.size + len(data)
         if self._size > CHUNK_BYTES:
             self.flush()
@@ -160,6 +164,9 @@ class McapFile:
         """Channel → log time and place in the chunk of each message, one behind the other."""
         self._defined = len(self._schemas), len(self._channels)
         """How many schemas and channels earlier chunks hold."""
+        if self._end - self._told_at >= TOLD_AGAIN_BYTES:
+            self._told_at = self._end
+            self._append(_packed(*self._schemas, *self._channels))
 
     def _append(self, record: bytes) -> None:
         self._pieces.append(record)

@@ -22,7 +22,7 @@ from gcs.recording.merge import completed
 from gcs.recording.reader import UnreadableRecording, located
 from gcs.recording.recovery import Part, Recovery
 from gcs.recording.salvage import Rescued, Salvaged, salvage
-from gcs.recording.seal import SEAL
+from gcs.recording.seal import SEAL, sealed
 from gcs.recording.tlog import Entries
 
 PERIOD_S = 0.1
@@ -123,7 +123,7 @@ def _write(path: Path, messages: Sequence[Rescued], about: _About, recovery: Rec
             file.attach(attachment.log_time, attachment.name, attachment.media_type, attachment.data)
         told = {METADATA: {}, **about.metadata, RECOVERED: recovery.metadata()}
         for name, values in told.items():
-            file.metadata(name, values)
+            file.metadata(name, sealed(name, values))
         schemas, channels = dict[str, int](), dict[str, int]()
         for topic, encoding, schema, time_ns, data in messages:
             if topic not in channels:

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from gcs.recording.files import DROPPED, METADATA, PART, SCENARIO, RecordingError, part
 from gcs.recording.mcap_file import McapFile
+from gcs.recording.seal import sealed
 
 AGAIN_NS = 1_000_000_000
 """Between two attempts to go on."""
@@ -96,7 +97,7 @@ class Rotation:
 
     def metadata(self, name: str, values: dict[str, str]) -> None:
         """Words about the whole, in the part being written."""
-        self._attempt(lambda file: file.metadata(name, values))
+        self._attempt(lambda file: file.metadata(name, sealed(name, values)))
 
     def flush(self, time_ns: int) -> None:
         """Every message so far, to the disk; or see whether it can go on."""
@@ -127,7 +128,7 @@ class Rotation:
         file = McapFile(path)
         try:
             words = {PART: str(self._number + 1), DROPPED: str(self.dropped)}
-            file.metadata(METADATA, self._about.metadata | words)
+            file.metadata(METADATA, sealed(METADATA, self._about.metadata | words))
             file.attach(self._about.start_ns, SCENARIO, "application/json", self._about.scenario)
         except OSError:
             _discard(file, path)
