@@ -33,7 +33,7 @@ def fleet_table(columns: Mapping[str, Sequence[Text]], *, width: int, least_need
 
 def _width(heading: str, cells: Sequence[Text]) -> int:
     """Of a column on the screen, with the space around it."""
-    return max(len(heading), *(cell.cell_len for cell in cells)) + 2
+    return max([len(heading), *(cell.cell_len for cell in cells)]) + 2
 
 
 def part(system: int, parts: Parts, *, released: bool = False) -> Text:
@@ -52,7 +52,7 @@ def mode(armed: bool, autopilot: int, custom_mode: int) -> Text:
 
 def number(value: float, unit: str) -> Text:
     """To a tenth; NaN is a dash."""
-    return Text("–" if math.isnan(value) else f"{value:.1f} {unit}")
+    return Text("–" if math.isnan(value) else f"{value:z.1f} {unit}")
 
 
 def share(value: float) -> Text:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 
@@ -23,9 +24,10 @@ class Reel:
     def __init__(self, path: Path) -> None:
         """path: of an MCAP file with an index. Raises UnreadableRecording."""
         self._path = path
-        with readable(path):
-            self._stream = path.open("rb")
-            self._reader = SeekingReader(self._stream, validate_crcs=True, record_size_limit=RECORD_SIZE_LIMIT)
+        with readable(path), ExitStack() as opened:
+            stream = opened.enter_context(path.open("rb"))
+            self._reader = SeekingReader(stream, validate_crcs=True, record_size_limit=RECORD_SIZE_LIMIT)
+            self._open = opened.pop_all()
         self._coming: Iterator[Read] = iter(())
         self._next: Message | None = None
         self._at_ns: int | None = None
@@ -38,7 +40,7 @@ class Reel:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._stream.close()
+        self._open.close()
 
     def play(self, span: Span) -> list[Message]:
         """What lies there, in the order of playing. Raises UnreadableRecording where the file is damaged there."""

@@ -29,7 +29,7 @@ REFRESH_NS = 100_000_000
 COLUMNS = ("UAV", "role", "mode", "north", "east", "height", "speed", "set-point", "battery", "age", "trust")
 OF_FRAMES = ("UAV", "mode", "north", "east", "height", "speed", "battery", "age")
 """Without what only flights of ours tell."""
-LEAST_NEEDED = ("battery", "speed", "role", "east", "north", "set-point")
+LEAST_NEEDED = ("battery", "speed", "role", "set-point", "age", "east", "north")
 """Columns that a narrow terminal goes without, the first first."""
 WIDE = 100
 """Characters from which trust is drawn, and not only written."""
@@ -79,8 +79,9 @@ def picture(controls: Controls, timeline: Timeline, view: View, *, title: str, w
     first, last = (f"{timeline.seconds(at_ns):.1f} s" for at_ns in (timeline.start_ns, timeline.end_ns))
     line = max(width - len(first) - len(last) - 2, 1)
     vehicles = _chosen(view.vehicles, max(height - FIXED - WORDS, 1))
-    room = height - FIXED - len(vehicles)
-    news = list(_news(so_far(timeline.happenings, player.position_ns), player.position_ns, timeline))[-room:]
+    room = max(height - FIXED - min(len(vehicles) + 1, len(view.vehicles)), 0)
+    news = list(_news(so_far(timeline.happenings, player.position_ns), player.position_ns, timeline))
+    news = news[max(len(news) - room, 0) :]
     lines: list[RenderableType] = [
         _between(Text(title, style="bold"), Text(_utc(player.position_ns), style="dim"), width),
         _between(_state(timeline, player, view), _motion(player), width),
@@ -114,8 +115,7 @@ def _utc(time_ns: int) -> str:
 
 def _state(timeline: Timeline, player: Player, view: View) -> Text:
     """Seconds, phase and task, and who is not heard."""
-    since = "of mission" if timeline.flight is not None else "since the first message"
-    text = Text(f"{timeline.seconds(player.position_ns):.1f} s {since}   ")
+    text = Text(f"{timeline.seconds(player.position_ns):z.1f} s {timeline.since}   ")
     text.append(view.phase, style="cyan")
     if view.task and view.phase == Phase.MISSION.value:
         text.append(f" · {view.task}")
@@ -185,12 +185,23 @@ def _setpoint(north_m_s: float, east_m_s: float) -> Text:
 def _news(happened: Sequence[Happening], position_ns: int, timeline: Timeline) -> Iterator[Text]:
     """In the order of time; what several vehicles said at once is one line."""
     for (time_ns, kind, said), several in groupby(happened, lambda one: (one.time_ns, one.kind, _said(one))):
-        whom = [str(happening.vehicle) for happening in several]
-        words = f"vehicle{'s' * (len(whom) > 1)} {', '.join(whom)}: {said[1]}" if said[0] else said[1]
+        whom = [happening.vehicle for happening in several if happening.vehicle is not None]
+        words = f"vehicle{'s' * (len(whom) > 1)} {_ranges(whom)}: {said[1]}" if said[0] else said[1]
         fresh = position_ns - time_ns <= NEWS_NS
         letter, style = MARKS[kind]
         when = f" {timeline.seconds(time_ns):7.1f} s  "
         yield Text.assemble((letter, style), (when, "" if fresh else "dim"), (words, "" if fresh else "dim"))
+
+
+def _ranges(ids: Sequence[int]) -> str:
+    """System ids in words: 1–3, 5."""
+    runs: list[list[int]] = []
+    for system in sorted(set(ids)):
+        if runs and system == runs[-1][-1] + 1:
+            runs[-1].append(system)
+        else:
+            runs.append([system])
+    return ", ".join(str(run[0]) if len(run) == 1 else f"{run[0]}–{run[-1]}" for run in runs)
 
 
 def _said(happening: Happening) -> tuple[bool, str]:

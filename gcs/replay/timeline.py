@@ -44,14 +44,22 @@ class Timeline:
     gaps: tuple[Gap, ...]
 
     @cached_property
-    def origin_ns(self) -> int:
-        """Mission start, or the first message where there is no mission."""
-        if self.flight is None:
-            return self.start_ns
-        rows = np.flatnonzero(np.isfinite(self.flight.mission_s))
-        if not rows.size:
-            return self.start_ns
+    def mission_ns(self) -> int | None:
+        """Mission start; None where there is no mission."""
+        rows = [] if self.flight is None else np.flatnonzero(np.isfinite(self.flight.mission_s)).tolist()
+        if self.flight is None or not rows:
+            return None
         return int(self.flight.time_ns[rows[0]]) - round(float(self.flight.mission_s[rows[0]]) * 1e9)
+
+    @property
+    def origin_ns(self) -> int:
+        """From when seconds are counted."""
+        return self.start_ns if self.mission_ns is None else self.mission_ns
+
+    @property
+    def since(self) -> str:
+        """The same in words."""
+        return "since the first message" if self.mission_ns is None else "since mission start"
 
     @cached_property
     def ticks(self) -> tuple[int, ...]:
@@ -71,7 +79,7 @@ class Timeline:
         return tuple(sorted({happening.time_ns for happening in self.happenings}))
 
     def seconds(self, time_ns: int) -> float:
-        """Since mission start, or since the first message."""
+        """Since the origin."""
         return (time_ns - self.origin_ns) / 1e9
 
     def place(self, asked: str, option: str = "") -> int:
