@@ -33,7 +33,9 @@ class Recorded:
         self.sent: list[list[bytes]] = [[] for _ in pages]
 
     def now(self) -> int:
-        """The recorded time of the current tick."""
+        """The recorded time of the current tick. Raises EndOfRecording where there is none."""
+        if not self._pages:
+            raise EndOfRecording
         return self._pages[max(self._page, 0)].time_ns
 
     def sleep_until(self, _time_ns: int) -> None:

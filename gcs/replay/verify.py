@@ -152,12 +152,9 @@ def _words(result: Verification) -> list[str]:
             "identical to the bit"
         )
     if result.gaps:
-        first, last = result.gaps[0]
-        which = f"tick {first}" if first == last else f"ticks {first} to {last}"
-        more = f", and {len(result.gaps) - 1} more such gaps" if len(result.gaps) > 1 else ""
         said.append(
-            f"not verified: the recording lacks frames of {which}{more}; what was decided after them cannot be decided "
-            f"again, {result.beyond} set-points among it"
+            f"not verified: the recording lacks frames of {_listed(result.gaps)}; what was decided after the first of "
+            f"them cannot be decided again, {result.beyond} set-points among it"
         )
     if result.unfinished:
         said.append(
@@ -165,6 +162,11 @@ def _words(result: Verification) -> list[str]:
             "the flight was killed"
         )
     return said
+
+
+def _listed(gaps: Sequence[Gap]) -> str:
+    ticks = [f"tick {gap.first}" if gap.first == gap.last else f"ticks {gap.first} to {gap.last}" for gap in gaps]
+    return ", ".join(ticks[:3]) + (f" and {len(ticks) - 3} more such gaps" if len(ticks) > 3 else "")
 
 
 def _difference(difference: Difference) -> str:

@@ -238,10 +238,11 @@ def digest(path):
     return hashed.hexdigest()
 
 
-def rewritten(path, change):
+def rewritten(path, change=lambda _at, _topic, _time, data: data, *, scenario=lambda data: data):
     """A copy of a recording, message by message.
 
-    change: (place in the file, topic, log time, payload) → payload, or None to leave the message out.
+    change: (place in the file, topic, log time, payload) → payload, or None to leave the message out;
+    scenario: changes the attachment.
     """
     copy = scratch() / "rewritten.mcap"
     with path.open("rb") as stream, copy.open("wb") as target:
@@ -259,7 +260,11 @@ def rewritten(path, change):
         stream.seek(0)
         for attachment in NonSeekingReader(stream).iter_attachments():
             writer.add_attachment(
-                attachment.create_time, attachment.log_time, attachment.name, attachment.media_type, attachment.data
+                attachment.create_time,
+                attachment.log_time,
+                attachment.name,
+                attachment.media_type,
+                scenario(attachment.data),
             )
         stream.seek(0)
         for metadata in NonSeekingReader(stream).iter_metadata():

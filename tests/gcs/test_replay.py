@@ -1,33 +1,49 @@
 """A recorded flight decided again: the same to the bit, or the tick at which it is not."""
 
-from io import StringIO
-
 import numpy as np
 import orjson
 import pytest
-from flights import SHORT, failing, fly_and_record, messages, recorded, rewritten
-from rich.console import Console
+from flights import SHORT, failing, fly_and_record, messages, recorded, rewritten, told
 
-from gcs.recording.reader import UnreadableRecording, ticks
-from gcs.replay.verify import decide_again, verify
-from wire.frames import Framer, Sender
+from gcs.recording.reader import SENT, UnreadableRecording, ticks
+from gcs.replay.again import Gap
+from gcs.replay.verify import decide_again
+from gcs.reproduce import conditions
+from wire.frames import Framer, Sender, target_system
 from wire.payloads import LOCAL_POSITION_NED, pack_local_position, unpack_local_position
 
-CONDITIONS = {
-    "trust-r": ("emergency",),
-    "average": ("emergency", 'control.rule="average"'),
-    "recommended": ("demo",),
-}
+PAPER = [condition for condition in conditions() if condition.severity is not None and condition.profile == "paper"]
 BRIEF = ("demo", *SHORT)
 
 
-@pytest.mark.parametrize("condition", CONDITIONS)
-def test_a_flight_decided_again_is_the_same_to_the_bit(condition):
-    flight = recorded(*CONDITIONS[condition])
+def flown(condition):
+    """Its flight, with no key named that the scenario has so: others have flown some of them."""
+    average = ['control.rule="average"'] if condition.controller == "average" else []
+    severe = [f"fault.0.max_speed_fraction={condition.severity}"] if condition.severity != 0.4 else []
+    flight = recorded(condition.scenario, *average, *severe)
+    assert flight.scenario == condition.build()
+    return flight
+
+
+def check_identical(flight):
     result = decide_again(flight.path)
     assert result.difference is None
+    assert result.identical
     assert result.ticks == round(flight.summary.simulated_s / 0.1)
-    assert result.setpoints == sum(frame[7] == 84 for _, frame in flight.link.sent)
+    assert result.setpoints == sum(frame[7] == 84 for _, frame in flight.link.sent) > 0
+
+
+def test_the_paper_has_eight_conditions():
+    assert len(PAPER) == 8
+
+
+@pytest.mark.parametrize("condition", PAPER, ids=lambda c: f"{c.scenario} {c.severity:.0%} {c.controller}")
+def test_all_set_points_of_the_papers_conditions_are_the_same_to_the_bit(condition):
+    check_identical(flown(condition))
+
+
+def test_so_are_those_of_another_profile():
+    check_identical(recorded(*BRIEF))
 
 
 def test_the_pages_of_a_recording_are_the_frames_that_the_loop_took_and_sent():
@@ -81,22 +97,162 @@ def test_a_set_point_taken_out_is_found():
     gone = sent[len(sent) // 2]
     tick = sum(topic == "/tick" for topic, _, _ in held[:gone])
     changed = rewritten(flight.path, lambda at, _t, _n, data: None if at == gone else data)
-    assert decide_again(changed).difference.tick == tick
+    difference = decide_again(changed).difference
+    assert (difference.tick, difference.recorded, difference.decided.raw) == (tick, None, held[gone][2])
+    assert difference.vehicle == target_system(difference.decided)
 
 
-def said(path):
-    console = Console(file=StringIO(), width=200)
-    return verify(path, console=console), console.file.getvalue()
+def verified(gcs, path, *options):
+    """Exit code, and what `gcs replay --verify` says."""
+    code, out, _ = gcs("replay", "--verify", path, *options)
+    return code, out
 
 
-def test_it_is_said_in_words_and_in_the_exit_code():
+def test_it_is_said_in_words_and_in_the_exit_code(gcs):
     flight = recorded(*BRIEF)
-    code, words = said(flight.path)
-    assert code == 0
-    assert f"{decide_again(flight.path).ticks} ticks decided again" in words
-    code, words = said(tampered(flight.path, system=1, tick=140, metres=0.5))
+    assert verified(gcs, flight.folder) == (
+        0,
+        f"{len(told(flight, '/tick'))} ticks decided again: all {decide_again(flight.path).setpoints} set-points, and "
+        "every other frame sent, identical to the bit\n",
+    )
+    code, words = verified(gcs, tampered(flight.path, system=1, tick=140, metres=0.5))
     assert code == 3
-    assert "tick 140" in words
+    assert words.startswith("the decision differs from tick 140 on, ")
+    assert "vehicle 1 was sent " in words
+    assert words.count(" m/s") == 2
+
+
+def test_it_is_one_object_for_programs(gcs):
+    flight = recorded(*BRIEF)
+    code, out = verified(gcs, flight.path, "--json")
+    assert code == 0
+    same = orjson.loads(out)
+    assert (same["identical"], same["difference"], same["gaps"]) == (True, None, [])
+    assert (same["setpoints_beyond_gaps"], same["frames_of_unfinished_ticks"]) == (0, 0)
+    code, out = verified(gcs, tampered(flight.path, system=1, tick=140, metres=0.5), "--json")
+    assert code == 3
+    other = orjson.loads(out)
+    assert (other["identical"], other["ticks"], other["setpoints"]) == (False, same["ticks"], same["setpoints"])
+    found = other["difference"]
+    assert (found["tick"], found["vehicle"], found["message"]) == (140, 1, "SET_POSITION_TARGET_LOCAL_NED")
+    (mission,) = (row["mission_s"] for row in told(flight, "/mission") if row["tick"] == 140)
+    assert found["mission_s"] == pytest.approx(mission)
+    assert {key for key in found["was"] if found["was"][key] != found["would_be"][key]} <= {"vx", "vy", "vz"}
+
+
+# --- another scenario
+
+
+def first_of_the_mission(flight):
+    return told(flight, "/mission")[0]["tick"]
+
+
+@pytest.mark.parametrize(
+    ("options", "after_s"),
+    [
+        (("--controller", "average"), 0.0),
+        (("--set", "fault.0.end_s=7.95"), 8.0),
+        (("--set", "event.0.heading_deg=1"), 6.0),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
+def test_a_changed_parameter_is_reported_at_the_first_tick_at_which_it_acts(gcs, options, after_s):
+    flight = recorded("emergency")
+    code, out = verified(gcs, flight.path, "--json", *options)
+    assert code == 3
+    found = orjson.loads(out)["difference"]
+    assert found["tick"] == first_of_the_mission(flight) + round(after_s / 0.1)
+    assert found["mission_s"] == pytest.approx(after_s)
+
+
+def test_what_no_decision_asks_for_may_change_without_a_difference(gcs):
+    unasked = ("expect.heading_error_deg=9", "noise.gust_m_s=0", "fault.0.max_speed_fraction=0.9")
+    assert verified(gcs, recorded("emergency").path, *(f"--set={key}" for key in unasked))[0] == 0
+
+
+def test_a_scenario_that_was_tampered_with_in_the_recording_is_found_where_it_acts():
+    flight = recorded(*BRIEF)
+
+    def with_another_gain(scenario):
+        tables = orjson.loads(scenario)
+        tables["control"]["c2"] += 0.1
+        return orjson.dumps(tables)
+
+    difference = decide_again(rewritten(flight.path, scenario=with_another_gain)).difference
+    assert difference.tick == first_of_the_mission(flight)
+    assert difference.vehicle in flight.scenario.swarm.leaders
+
+
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [
+        ("time.period_s=0.2", "time.period_s = 0.2: it was recorded with 0.1"),
+        ("swarm.rows=3", "swarm.rows × swarm.columns = 9: it was recorded with 6"),
+        ("control.c9=1", "run.mcap: control.c9 = 1: there is no such key"),
+    ],
+)
+def test_what_a_recording_cannot_be_asked_is_refused_in_a_sentence(gcs, key, said):
+    code, out, err = gcs("replay", "--verify", recorded(*BRIEF).path, "--set", key)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1
+
+
+# --- recordings of which something is lost
+
+
+def without(path, lost):
+    """A copy of a recording without the messages of these ticks. lost: (tick, topic, payload) → whether it is."""
+    place, tick = {}, 0
+    for at, (topic, _, _data) in enumerate(messages(path)):
+        place[at] = tick
+        tick += topic == "/tick"
+    return rewritten(path, lambda at, topic, _time, data: None if lost(place[at], topic, data) else data)
+
+
+def test_it_is_verified_as_far_as_the_first_gap_and_no_further(gcs):
+    flight = recorded(*BRIEF)
+    torn = without(flight.path, lambda tick, _topic, _data: tick in (130, 131, 150))
+    result = decide_again(torn)
+    assert (result.ticks, result.difference) == (130, None)
+    assert result.gaps == (Gap(130, 131), Gap(150, 150))
+    whole = decide_again(flight.path)
+    assert whole.setpoints - result.setpoints - result.beyond == 3 * flight.scenario.swarm.count
+    assert not result.identical
+    code, words = verified(gcs, torn)
+    assert code == 3
+    assert f"130 ticks decided again: all {result.setpoints} set-points" in words
+    assert "the recording lacks frames of ticks 130 to 131, tick 150; what was decided" in words
+    assert f"{result.beyond} set-points among it" in words
+
+
+def test_one_lost_frame_of_what_a_tick_consumed_is_a_gap():
+    flight = recorded(*BRIEF)
+    place = telemetry(flight.path, 3, 140)
+    result = decide_again(rewritten(flight.path, lambda at, _topic, _time, data: None if at == place else data))
+    assert (result.ticks, result.gaps, result.difference) == (140, (Gap(140, 140),), None)
+
+
+def test_of_a_recording_without_its_beginning_nothing_is_verified(gcs):
+    flight = recorded(*BRIEF)
+    headless = without(flight.path, lambda tick, _topic, _data: tick < 20)
+    result = decide_again(headless)
+    assert (result.ticks, result.setpoints, result.gaps) == (0, 0, (Gap(0, 19),))
+    code, words = verified(gcs, headless)
+    assert code == 3
+    assert "identical" not in words
+
+
+def test_frames_of_ticks_that_were_never_told_are_counted_and_not_verified(gcs):
+    flight = recorded(*BRIEF)
+    killed = without(flight.path, lambda tick, topic, _data: tick >= 140 and not topic.startswith("/mavlink"))
+    result = decide_again(killed)
+    assert (result.ticks, result.difference, result.identical) == (140, None, False)
+    sent = sum(topic == SENT for topic, _, _ in messages(killed))
+    assert result.unfinished == sent - sum(len(page.sent) for page in ticks(killed)) > 0
+    code, words = verified(gcs, killed)
+    assert code == 3
+    assert f"not verified: {result.unfinished} frames at the end" in words
 
 
 def test_a_flight_cut_short_is_decided_again_as_far_as_it_went(tmp_path):
