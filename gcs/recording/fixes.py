@@ -6,11 +6,16 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import numpy.typing as npt
 from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
 
 from gcs.loop import Tick
+from gcs.recording.looks import shades
+from gcs.recording.shapes import colour
 from gcs.recording.transforms import body
 from gcs.swarm_frame import SwarmFrame
+
+Array = npt.NDArray[np.float64]
 
 VERTICAL = 2.0
 """Receivers are some two times as far off in height as on the map; they tell of the latter only."""
@@ -22,16 +27,21 @@ class Fixes:
     def __init__(self, ids: Sequence[int]) -> None:
         self._messages = [LocationFix(frame_id=body(system)) for system in ids]
 
-    def at(self, tick: Tick, frame: SwarmFrame) -> Iterator[bytes]:
-        """Of each vehicle in the order of their ids, by telemetry; altitude is above mean sea level."""
+    def at(self, tick: Tick, frame: SwarmFrame, trust: Array) -> Iterator[bytes]:
+        """Of each vehicle in the order of their ids, by telemetry; altitude is above mean sea level.
+
+        trust: (N,) as it is to be shown, NaN where nobody asks for it.
+        """
         seconds, nanoseconds = divmod(tick.time_ns, 1_000_000_000)
         places = frame.to_geodetic(tick.diagnosis.position_ne).tolist()
         altitudes = np.where(np.isfinite(tick.swarm.home_m), tick.swarm.home_m, tick.swarm.origin[:, 2])
         altitudes = altitudes - tick.swarm.position_ned[:, 2]
-        known = zip(self._messages, places, altitudes.tolist(), tick.swarm.accuracy_m.tolist(), strict=True)
-        for fix, (latitude, longitude), altitude, accuracy_m in known:
+        accuracies_m = tick.swarm.accuracy_m.tolist()
+        known = zip(self._messages, places, altitudes.tolist(), accuracies_m, shades(trust), strict=True)
+        for fix, (latitude, longitude), altitude, accuracy_m, shade in known:
             fix.timestamp.seconds, fix.timestamp.nanos = seconds, nanoseconds
             fix.latitude, fix.longitude, fix.altitude = latitude, longitude, altitude
+            fix.color.CopyFrom(colour(shade))
             _claim(fix, accuracy_m)
             yield bytes(fix.SerializeToString())
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from gcs.gate import LOST_NS
 from gcs.loop import Tick
 from gcs.scoring import DISTRUSTED
 from gcs.track import Parts
 from gcs.trust_colour import trust_colour
+
+Array = npt.NDArray[np.float64]
 
 SHADES = 20
 """Steps of trust: what changes by less looks as before."""
@@ -29,11 +32,14 @@ class Look(NamedTuple):
     """Silent."""
 
 
-def looks(tick: Tick, parts: Parts, *, asks_for_trust: bool) -> list[Look]:
-    """Of all vehicles. asks_for_trust: of the rule that flies them; where it does not, nobody is distrusted."""
+def shades(trust: Array) -> list[tuple[float, float, float]]:
+    """Red, green, blue of each vehicle, of trusts (N,)."""
+    return list(map(tuple, trust_colour(np.round(trust * SHADES) / SHADES).tolist()))
+
+
+def looks(tick: Tick, parts: Parts, trust: Array) -> list[Look]:
+    """Of all vehicles. trust: (N,); NaN where the rule that flies them asks for none, and then nobody is distrusted."""
     swarm = tick.swarm
-    trust = tick.diagnosis.trust if asks_for_trust else np.full(len(swarm.ids), np.nan)
-    colours = trust_colour(np.round(trust * SHADES) / SHADES).tolist()
     told = (
         [system in parts.leaders for system in swarm.ids],
         (trust < DISTRUSTED).tolist(),
@@ -42,8 +48,8 @@ def looks(tick: Tick, parts: Parts, *, asks_for_trust: bool) -> list[Look]:
         tick.state.released.tolist(),
     )
     return [
-        Look(tuple(colour), _label(system, flags), ringed=flags[1] or flags[2], faded=flags[3])
-        for system, colour, *flags in zip(swarm.ids, colours, *told, strict=True)
+        Look(colour, _label(system, flags), ringed=flags[1] or flags[2], faded=flags[3])
+        for system, colour, *flags in zip(swarm.ids, shades(trust), *told, strict=True)
     ]
 
 

@@ -49,9 +49,9 @@ class Sayings:
             self._people(tick),
             self._vehicles(tick),
             self._silence(tick),
+            self._flight(tick),
             self._trust(tick),
             self._roles(tick),
-            self._flight(tick),
         ):
             name = kind.value if system is None else f"{kind.value}/{body(system)}"
             time = Timestamp(seconds=seconds, nanos=nanoseconds)

@@ -17,7 +17,6 @@ from gcs.recording import shapes
 from gcs.recording.looks import Look, looks
 from gcs.recording.shapes import colour
 from gcs.recording.transforms import FORMATION, SWARM, position_enu
-from gcs.summary import trust_of
 from gcs.track import Parts, parts_of
 from scenarios import Scenario
 
@@ -40,7 +39,6 @@ class Scene:
         swarm = scenario.swarm
         self._plan = plan(scenario)
         self._height_m = swarm.altitude_m
-        self._asks_for_trust = trust_of(scenario) is not None
         self._at_first = Parts(0.0, swarm.leaders, ())
         self._calls = -1
         self._looks: list[Look | None] = [None] * swarm.count
@@ -60,12 +58,15 @@ class Scene:
         for _ in self._vehicles:
             self._trails.lines.add(pose=shapes.pose(), thickness=TRAIL_PX, scale_invariant=True)
 
-    def at(self, tick: Tick) -> bytes:
-        """The whole scene, once the swarm's frame is known; positions are telemetry's."""
+    def at(self, tick: Tick, trust: Array) -> bytes:
+        """The whole scene, once the swarm's frame is known; positions are telemetry's.
+
+        trust: (N,) as it is to be shown, NaN where nobody asks for it.
+        """
         position = position_enu(tick)
         centre = position.mean(axis=0)
         self._draw_path(tick.diagnosis.mission_s)
-        self._draw_vehicles(tick)
+        self._draw_vehicles(tick, trust)
         self._draw_trails(position, tick.time_ns)
         self._draw_leader(tick, centre)
         self._draw_links(position - centre, tick)
@@ -80,9 +81,9 @@ class Scene:
             self._calls = calls
             self._path.CopyFrom(shapes.path(self._plan, calls, self._height_m))
 
-    def _draw_vehicles(self, tick: Tick) -> None:
+    def _draw_vehicles(self, tick: Tick, trust: Array) -> None:
         parts = parts_of(tick) or self._at_first
-        for row, look in enumerate(looks(tick, parts, asks_for_trust=self._asks_for_trust)):
+        for row, look in enumerate(looks(tick, parts, trust)):
             if look != self._looks[row]:
                 self._looks[row], self._colours[row] = look, colour(look.colour)
                 self._vehicles[row].CopyFrom(shapes.vehicle(tick.swarm.ids[row], look))

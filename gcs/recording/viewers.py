@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+import numpy as np
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
 from foxglove_schemas_protobuf.Log_pb2 import Log
@@ -20,6 +21,7 @@ from gcs.recording.fixes import Fixes
 from gcs.recording.said import Sayings
 from gcs.recording.scene import Scene
 from gcs.recording.transforms import Transforms
+from gcs.summary import trust_of
 from scenarios import Scenario
 
 FIX_S = 1.0
@@ -49,6 +51,8 @@ class Viewers:
         self._scene = Scene(scenario)
         self._scene_ticks = scenario.time.ticks(SCENE_S)
         self._sayings = Sayings(scenario)
+        self._asks_for_trust = trust_of(scenario) is not None
+        self._unasked = np.full(len(ids), np.nan)
 
     def of(self, tick: Tick) -> Iterator[Drawn]:
         """Everything that this turn of the loop has for viewers; places only once the swarm's frame is known."""
@@ -58,8 +62,9 @@ class Viewers:
         if frame is None:
             return
         yield Drawn("/tf", FrameTransforms, self._transforms.at(tick))
+        trust = tick.diagnosis.trust if self._asks_for_trust else self._unasked
         if tick.number % self._fix_ticks == 0:
-            for topic, fix in zip(self._fix_topics, self._fixes.at(tick, frame), strict=True):
+            for topic, fix in zip(self._fix_topics, self._fixes.at(tick, frame, trust), strict=True):
                 yield Drawn(topic, LocationFix, fix)
         if tick.number % self._scene_ticks == 0:
-            yield Drawn("/swarm/scene", SceneUpdate, self._scene.at(tick))
+            yield Drawn("/swarm/scene", SceneUpdate, self._scene.at(tick, trust))

@@ -146,6 +146,13 @@ def test_vehicles_and_trails_have_the_colour_of_their_trust():
             assert ("distrusted" in drawn[f"uav_{system}"].texts[0].text) == (trust < 0.5)
 
 
+def test_a_map_shows_trust_as_well():
+    flight = recorded("emergency")
+    last = {system: viewed(flight.path)[f"/uav/{system}/fix"][-1][1].color for system in SYSTEMS}
+    for system, colour in last.items():
+        assert rgb(colour) == pytest.approx(trust_colour(float(system != 5)))
+
+
 def test_a_rule_that_asks_for_no_trust_is_drawn_grey_and_nobody_is_distrusted():
     flight = recorded("demo", *SHORT, "control.rule=average")
     for _, drawn in scenes(flight):
