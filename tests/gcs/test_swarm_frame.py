@@ -78,3 +78,16 @@ def test_the_origin_of_a_place_is_where_that_place_is_counted_from(latitude_deg,
     place = pymap3d.ned2geodetic(*position_ned, latitude_deg, longitude_deg, 300.0)
     back = pymap3d.geodetic2ned(*origin_of(*place, position_ned), latitude_deg, longitude_deg, 300.0)
     assert back == pytest.approx((0, 0, 0), abs=5e-3)  # down is not quite the same direction 140 m away
+
+
+@given(latitudes, longitudes, st.floats(-100, 100), st.floats(-100, 100))
+def test_the_way_back_to_the_earth_ends_where_it_began(latitude_deg, longitude_deg, north, east):
+    frame = frame_at(latitude_deg, longitude_deg, run_up_ne=np.array([4.5, -1.0]))
+    place = frame.to_geodetic(np.array([[north, east]]))
+    assert frame.to_ne(*place.T) == pytest.approx(np.array([[north, east]]), abs=1e-6)
+
+
+def test_east_of_the_date_line_is_west():
+    frame = frame_at(10.0, 179.9999)
+    ((_, longitude_deg),) = frame.to_geodetic(np.array([[0.0, 100.0]]))
+    assert longitude_deg == pytest.approx(-179.9992, abs=1e-4)
