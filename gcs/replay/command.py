@@ -27,8 +27,8 @@ from wire.clock import WallClock
 
 TURN_NS = 10_000_000
 """Real time between two looks at what is due."""
-LONGEST_TURN_NS = 500_000_000
-"""Of real time, a turn counts no more: a replay that was stopped goes on where it was."""
+LONGEST_TURN_NS = 200_000_000
+"""Of real time, a turn counts no more: a replay that was stopped goes on where it was, and sends nothing in a burst."""
 WORD_NS = 1_000_000_000
 """Real time between two words where there is no terminal."""
 
