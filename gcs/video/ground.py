@@ -48,7 +48,7 @@ def named(view: View, plan: Plan | None) -> Iterator[Artist]:
     yield lines([[(right, top - 42), (right, top - 4)]], DARK, 2.0)
     yield shapes([Path(np.array([(right, top), (right - 6, top - 14), (right + 6, top - 14)]))], DARK)
     yield words(right, top - 58, "N", size=13, ha="center", weight="bold")
-    right, up = right - 34.0, top - 36.0
+    up = view.box.bottom + 54.0  # above the legend
     left = right - SCALE_M * view.scale
     yield lines([[(left, up + 5), (left, up), (right, up), (right, up + 5)]], DARK, 2.0)
     yield words(0.5 * (left + right), up + 9, f"{SCALE_M:g} m", size=12, ha="center")

@@ -19,7 +19,9 @@ from fdm.world import World
 from gcs.flight import Flight
 from gcs.lockstep import Lockstep
 from gcs.loop import fly
+from gcs.recording.reader import RECORDING
 from gcs.recording.writer import Recorder, Tap
+from gcs.session import AS_IN_RUN, Recording
 from gcs.track import Tracker
 from gcs.truth import Truth
 from scenarios import Scenario, load
@@ -52,14 +54,14 @@ class Cost:
 def measure(physics_hz: int) -> Cost:
     """Fly `emergency` under Trust-R."""
     scenario = load("emergency", overrides=[f"time.physics_hz={physics_hz}"])
-    ticks = _flight(scenario, recorded=True)[1]
+    ticks = flight(scenario, AS_IN_RUN)[1]
     steps = ticks * scenario.time.steps_per_tick
     bare = [_bare(scenario, steps)]
     loops: list[float] = []
     ratios: dict[bool, list[float]] = {True: [], False: []}
     for _ in range(REPEATS):
         for recorded in (True, False):
-            seconds = _flight(scenario, recorded=recorded)[0]
+            seconds = flight(scenario, AS_IN_RUN if recorded else None)[0]
             bare.append(_bare(scenario, steps))
             beside = 0.5 * (bare[-1] + bare[-2])
             ratios[recorded].append((seconds - beside) / beside)
@@ -75,23 +77,27 @@ def measure(physics_hz: int) -> Cost:
     )
 
 
-def _flight(scenario: Scenario, *, recorded: bool) -> tuple[float, int]:
-    """(CPU seconds, ticks) of one flight."""
-    flight = Flight(scenario)
+def flight(scenario: Scenario, how: Recording | None, folder: Path | None = None) -> tuple[float, int]:
+    """(CPU seconds, ticks) of one flight. how: it is recorded; None: not at all;  folder: for its file."""
+    decide = Flight(scenario)
     world = Lockstep(World(scenario, seed=1))
-    truth = Truth(flight.ids)
-    tracker = Tracker(flight, truth)
-    if not recorded:
-        return _timed(lambda: fly(world, world, flight, (truth, tracker), period_ns=scenario.time.period_ns).tick)
-    with tempfile.TemporaryDirectory() as folder:
-        recorder = Recorder(Path(folder) / "run.mcap", scenario, truth, start_ns=world.now(), metadata={})
+    truth = Truth(decide.ids)
+    tracker = Tracker(decide, truth)
+    period_ns = scenario.time.period_ns
+    if how is None:
+        return timed(lambda: fly(world, world, decide, (truth, tracker), period_ns=period_ns).tick)
+    with tempfile.TemporaryDirectory() as temporary:
+        path = (Path(temporary) if folder is None else folder) / RECORDING
+        recorder = Recorder(
+            path, scenario, truth, start_ns=world.now(), metadata={}, flush_ns=how.flush_ns, decodes=how.decodes
+        )
 
         def fly_and_close() -> int:
             with recorder:
                 tap = Tap(world, world, recorder)
-                return fly(tap, world, flight, (truth, tracker, recorder), period_ns=scenario.time.period_ns).tick
+                return fly(tap, world, decide, (truth, tracker, recorder), period_ns=period_ns).tick
 
-        return _timed(fly_and_close)
+        return timed(fly_and_close)
 
 
 def _bare(scenario: Scenario, steps: int) -> float:
@@ -110,10 +116,11 @@ def _bare(scenario: Scenario, steps: int) -> float:
                 vehicle.step(BURST)
         return steps
 
-    return _timed(step)[0]
+    return timed(step)[0]
 
 
-def _timed(work: Callable[[], int]) -> tuple[float, int]:
+def timed(work: Callable[[], int]) -> tuple[float, int]:
+    """(CPU seconds, what it returned)."""
     start = time.process_time()
     result = work()
     return time.process_time() - start, result
@@ -131,7 +138,7 @@ def main() -> None:
         )
     print("\nwhere it goes at 250 Hz, as a fraction of the physics in the loop")
     scenario = load("emergency")
-    counted = sample(lambda: [_flight(scenario, recorded=True) for _ in range(8)])
+    counted = sample(lambda: [flight(scenario, AS_IN_RUN) for _ in range(8)])
     for part, count in counted.most_common():
         print(f"  {count / counted['physics']:5.2f}  {part}")
 
