@@ -57,7 +57,9 @@ def figure(value: float) -> str:
 def round_values(low: float, high: float, most: int = 6) -> list[float]:
     """1, 2 or 5 times a power of ten apart, within the range."""
     power = 10.0 ** math.floor(math.log10((high - low) / most))
-    step = next(step for step in (power, 2 * power, 5 * power, 10 * power, 20 * power) if (high - low) / step < most)
+    step = next(
+        step for step in (power, 2 * power, 5 * power, 10 * power, 20 * power) if (high - low) / step <= most - 1 + 1e-9
+    )
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
     return [round(number * step, 10) for number in range(first, last + 1)]
 

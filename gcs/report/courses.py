@@ -143,7 +143,7 @@ def _ways(told: Told, ground: Ground, position: Array) -> list[str]:
         ]
     seen = [row for row in order if np.isfinite(position[-1, row]).all()]
     marks = [_robot(told, ground, row, position[-1, row]) for row in seen]
-    return [*parts, *_numbers(told, ground, position[-1], seen), *marks, *end]
+    return [*parts, *end, *_numbers(told, ground, position[-1], seen), *marks]
 
 
 def _robot(told: Told, ground: Ground, row: int, place: Array) -> str:
