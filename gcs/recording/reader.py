@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
@@ -105,8 +105,10 @@ def located(path: Path) -> Path:
 
 def instead_of_scenario(name: str) -> Path | None:
     """The recording that was named where a scenario may be; None if it is one. Scenarios that ship come first."""
-    path = located(Path(name))
-    return path if path.suffix == ".mcap" and name not in names() else None
+    with suppress(OSError):  # too long a name, say
+        path = located(Path(name))
+        return path if path.suffix == ".mcap" and name not in names() else None
+    return None
 
 
 @contextmanager
