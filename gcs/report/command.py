@@ -11,8 +11,10 @@ from gcs.guard import DONE
 from gcs.output import whole
 from gcs.recording.history import load
 from gcs.recording.reader import located
+from gcs.report.page import page
 
 PAGE = "report.html"
+SUFFIXES = ".html", ".htm"
 
 
 def report(recordings: Sequence[Path], *, out: Path | None, console: Any) -> int:
@@ -22,13 +24,10 @@ def report(recordings: Sequence[Path], *, out: Path | None, console: Any) -> int
     """
     if not recordings:
         raise BadUsageError("report: name at least one recording, or the folder of a run")
-    histories = [load(path) for path in recordings]
-    target = located(recordings[0]).with_name(PAGE) if out is None else out
-    if target.is_dir():
-        target = target / PAGE
-    from gcs.report.page import page
-
-    html = page(histories)
+    target = located(recordings[0]).with_name(PAGE) if out is None else out / PAGE if out.is_dir() else out
+    if target.suffix not in SUFFIXES:
+        raise BadUsageError(f"--out {target}: must end in {' or '.join(SUFFIXES)}")
+    html = page([load(path) for path in recordings])
     with whole(target) as unfinished:
         unfinished.write_text(html, encoding="utf-8")
     console.print(f"report     {target.resolve()}", highlight=False, soft_wrap=True, markup=False)

@@ -177,3 +177,12 @@ def test_a_page_that_cannot_be_written_is_a_sentence_and_leaves_nothing_torn(gcs
     assert code == 2
     assert "page.html: cannot be written" in err
     assert [one.name for one in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_page_never_takes_the_place_of_a_recording(gcs, tmp_path):
+    path = shutil.copy(recorded("emergency", AUTO).path, tmp_path)
+    before = (tmp_path / "run.mcap").read_bytes()
+    code, _, err = gcs("report", path, "--out", path)
+    assert code == 2
+    assert err.endswith("must end in .html or .htm\n")
+    assert (tmp_path / "run.mcap").read_bytes() == before
