@@ -148,9 +148,9 @@ class Recovery:
         elif part.ended:
             yield f"damaged: {_count(part.messages, 'message')} are left"
         else:
-            yield f"torn: without its summary; {_count(part.messages, 'message')} are left"
+            yield f"torn: it ends without its summary; {_count(part.messages, 'message')} are left"
         for damage in part.damage:
-            yield f"{_count(damage.length, 'byte')} unreadable {self._between(damage)}"
+            yield f"{_count(damage.length, 'byte')} cannot be read {self._between(damage)}"
         if part.unnamed:
             yield f"{_count(part.unnamed, 'message')} lost with the name of their topic"
         if part.unsealed and not part.whole:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from io import BytesIO
 from typing import NamedTuple
 
-from mcap.data_stream import ReadDataStream
+from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Footer, Metadata, Schema
 
@@ -23,9 +23,9 @@ from gcs.recording.mcap_file import MAGIC
 from gcs.recording.pieces import MESSAGE, RECORD, content_of, pieces, records, stream_of
 from gcs.recording.seal import is_sealed
 
-_INDEX = struct.Struct("<BQHI")
-"""How the index of a chunk's messages begins: opcode, length, channel, and the length of its entries."""
-_INDEX_HEAD, _DATA_END_LENGTH = 6, 4
+_INDEX, _ENTRY = struct.Struct("<HI"), struct.Struct("<QQ")
+"""How the index of a chunk's messages begins: channel, and the length of its entries; time and place of each."""
+_DATA_END_LENGTH = 4
 _FOOTER_BYTES = 29
 
 
@@ -131,38 +131,59 @@ def salvage(data: bytes) -> Salvaged:
     """Everything in a file that can be trusted."""
     left = Salvaged()
     _take_summary(left, data)
+    told = _Messages((), None, None)
     last_ns: int | None = None
+    reached = 0
     holes: list[Damage] = []
     """Behind the last chunk."""
-    reached = 0
     for start, stop, record in pieces(data):
-        holes += _unexplained(data, reached, start, last_ns)
+        holes += _unexplained(data, reached, start, told, last_ns)
         reached = stop
         if isinstance(record, Chunk):
-            first_ns, behind_ns = _take(left, record)
-            left.damage += (replace(hole, before_ns=first_ns) for hole in holes)
-            holes, last_ns = [], last_ns if behind_ns is None else behind_ns
+            told = _take(left, record)
+            if not _as_written(record, data[start:stop], told):
+                holes.append(Damage(start, stop - start - len(record.data), last_ns, None))
+            left.damage += (replace(hole, before_ns=told.first_ns) for hole in holes)
+            holes, last_ns = [], told.last_ns or last_ns
         elif isinstance(record, Attachment):
             left.attachments.append(record)
         else:
             left.metadata.append(record)
-    left.damage += [*holes, *_unexplained(data, reached, len(data), last_ns)]
+    left.damage += [*holes, *_unexplained(data, reached, len(data), told, last_ns)]
     return left
 
 
-def _take(left: Salvaged, chunk: Chunk) -> tuple[int | None, int | None]:
-    """Times of the chunk's first and last message; None of a chunk without."""
+class _Messages(NamedTuple):
+    """What the indexes behind a chunk must tell of it."""
+
+    places: Collection[tuple[int, int, int]]
+    """Channel, time and place in the chunk of each message."""
+    first_ns: int | None
+    """Time of the first; None of a chunk without any."""
+    last_ns: int | None
+
+
+def _take(left: Salvaged, chunk: Chunk) -> _Messages:
     left.chunks.append(chunk)
-    first_ns = last_ns = None
+    places = []
     content = content_of(chunk)
     for opcode, start, stop in records(content):
         if opcode == Opcode.MESSAGE:
-            number, _sequence, last_ns, _publish_ns = MESSAGE.unpack_from(content, start)
+            number, _sequence, time_ns, _publish_ns = MESSAGE.unpack_from(content, start)
             left.counts[number] += 1
-            first_ns = last_ns if first_ns is None else first_ns
+            places.append((number, time_ns, start - RECORD.size))
         else:
             _define(left, opcode, content[start:stop])
-    return first_ns, last_ns
+    return _Messages(frozenset(places), *((places[0][1], places[-1][1]) if places else (None, None)))
+
+
+def _as_written(chunk: Chunk, record: bytes, told: _Messages) -> bool:
+    """Whether what no CRC covers of a chunk is right, too: whoever believes it would be misled."""
+    builder = RecordBuilder()
+    chunk.write(builder)
+    times = [time_ns for _, time_ns, _ in told.places] or [0]
+    same: bool = builder.end() == record  # type: ignore[no-untyped-call]
+    return same and (chunk.message_start_time, chunk.message_end_time) == (min(times), max(times))
 
 
 def _define(left: Salvaged, opcode: int, body: bytes) -> None:
@@ -190,21 +211,30 @@ def _take_summary(left: Salvaged, data: bytes) -> None:
             _define(left, opcode, summary[start:stop])
 
 
-def _unexplained(data: bytes, start: int, stop: int, after_ns: int | None) -> Iterator[Damage]:
-    """What lies between two pieces, from the first byte on that is not as it should be there."""
+def _unexplained(data: bytes, start: int, stop: int, told: _Messages, after_ns: int | None) -> Iterator[Damage]:
+    """What lies between two pieces, from the first byte on that is not as it should be there.
+
+    told: what the chunk before them holds.
+    """
     at = start
     if start == 0 and data.startswith(MAGIC):
         at = len(MAGIC)
     while at < stop:
-        opcode, length, _channel, entries = (
-            _INDEX.unpack_from(data, at) if at + _INDEX.size <= len(data) else (0, 0, 0, 0)
-        )
-        behind = at + RECORD.size + length
+        opcode, length = RECORD.unpack_from(data, at) if at + RECORD.size <= stop else (0, 0)
+        body = data[at + RECORD.size : min(at + RECORD.size + length, stop)]
         if opcode == Opcode.DATA_END and length == _DATA_END_LENGTH and stop == len(data):
             return  # the summary has a CRC of its own, and is rebuilt
         header = opcode == Opcode.HEADER and at == len(MAGIC)
-        index = opcode == Opcode.MESSAGE_INDEX and entries == length - _INDEX_HEAD
-        if behind > stop or not (header or index):
+        if len(body) < length or not (header or (opcode == Opcode.MESSAGE_INDEX and _indexes(body, told))):
             yield Damage(at, stop - at, after_ns, None)
             return
-        at = behind
+        at += RECORD.size + length
+
+
+def _indexes(body: bytes, told: _Messages) -> bool:
+    """Whether an index tells where messages of the chunk before it are."""
+    if len(body) < _INDEX.size or (len(body) - _INDEX.size) % _ENTRY.size:
+        return False
+    channel, length = _INDEX.unpack_from(body)
+    entries = _ENTRY.iter_unpack(body[_INDEX.size :])
+    return length == len(body) - _INDEX.size and all((channel, *entry) in told.places for entry in entries)

@@ -17,9 +17,9 @@ def sealed(name: str, values: Mapping[str, str]) -> dict[str, str]:
 
 def is_sealed(name: str, values: Mapping[str, str]) -> bool | None:
     """Whether the CRC is right; None of values that came without one."""
-    rest = {key: value for key, value in values.items() if key != SEAL}
-    return values[SEAL] == _crc(name, rest) if SEAL in values else None
+    return values[SEAL] == _crc(name, values) if SEAL in values else None
 
 
 def _crc(name: str, values: Mapping[str, str]) -> str:
-    return f"{zlib.crc32(orjson.dumps([name, values], option=orjson.OPT_SORT_KEYS)):08x}"
+    rest = {key: value for key, value in values.items() if key != SEAL}
+    return f"{zlib.crc32(orjson.dumps([name, rest], option=orjson.OPT_SORT_KEYS)):08x}"
