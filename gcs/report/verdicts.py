@@ -84,7 +84,9 @@ def _verdict(told: Told) -> tuple[Cell, ...]:
 
 
 def _ended(told: Told) -> Cell:
-    rests_on = "by telemetry: no truth was told" if told.history.measured else ""
+    grounds = ["by telemetry: no truth was told"] if told.history.measured else []
+    grounds += ["from a recovered recording"] if told.history.recovered is not None else []
+    rests_on = "; ".join(grounds)
     if told.history.problem is not None:
         return Cell("not completed", told.history.problem, FAILED)
     if told.score is None:

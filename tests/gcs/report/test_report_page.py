@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from dataclasses import replace
 
 import pytest
 from flights import recorded
@@ -143,6 +144,12 @@ def test_the_page_names_its_flights_apart_and_how_each_ended(html):
     table = re.sub(r"<[^>]*>|\s", " ", html.split("</table>")[0])
     for said in ("failed", "passed", "not completed", "14.0°", "at most 4°", "robot 5: 1.3", "no false alarm"):
         assert said in table
+
+
+def test_what_a_verdict_rests_on_is_said_beside_it():
+    shaky = page([replace(dragged(2, 3), measured=True, recovered={})])
+    assert "by telemetry: no truth was told; from a recovered recording" in shaky
+    assert "by telemetry" not in page([dragged(2, 3)])
 
 
 def test_two_flights_take_less_than_a_megabyte():
