@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from gcs.beliefs import Belief
 from gcs.link_quality import LinkQuality
@@ -16,26 +17,32 @@ from gcs.track import Parts, changed, parts_of
 from gcs.truth import Truth
 from scenarios import Fault, Scenario
 
+Array = npt.NDArray[np.float64]
+
 STATE_EVERY_TICKS = 5
 """Between two /uav/<id>/state: attitude, mode and battery do not come more often."""
 LINK_EVERY_NS = 1_000_000_000
 Said = tuple[str, Any]
 """A topic, and the dataclass of gcs.recording.topics that is its message."""
+Pose = tuple[Array, Array]
+"""Where a simulation's vehicles really are, (N, 3) m, north, east of the swarm's origin and height above home; and how
+fast they move, (N, 3) m/s, north, east, down.
+"""
 
 
 class OwnTopics:
     """Remembers what is told only when it changes."""
 
-    def __init__(self, scenario: Scenario, truth: Truth, reception: Callable[[], Reception]) -> None:
+    def __init__(self, scenario: Scenario, reception: Callable[[], Reception]) -> None:
         """reception: tells how the vehicles were heard; /link is where it knows."""
-        self._truth, self._reception = truth, reception
+        self._reception = reception
         self._faults = scenario.fault
         self._active = [False] * len(scenario.fault)
         self._parts: Parts | None = None
         self._link_ns: int | None = None
 
-    def of(self, tick: Tick) -> Iterator[Said]:
-        """Everything but /tick, which ends a turn."""
+    def of(self, tick: Tick, pose: Pose | None) -> Iterator[Said]:
+        """Everything but /tick, which ends a turn. pose: the truth at this tick, where it is known."""
         number, diagnosis = tick.number, tick.diagnosis
         yield from self._fleet(tick)
         if diagnosis.sent_ned is not None:
@@ -47,9 +54,8 @@ class OwnTopics:
             )
         if diagnosis.virtual is not None:
             yield from self._mission(tick)
-        if self._truth.known and tick.state.frame is not None:
-            position = self._truth.position(tick.state.frame, tick.swarm)
-            yield "/truth/pose", topics.PoseTopic(number, diagnosis.mission_s, position, self._truth.velocity_ned)
+        if pose is not None:
+            yield "/truth/pose", topics.PoseTopic(number, diagnosis.mission_s, *pose)
         for rating in diagnosis.ratings:
             whom = "swarm" if rating.vehicle is None else rating.vehicle
             yield (
@@ -121,6 +127,13 @@ class OwnTopics:
                 rejected=dict(heard.rejections),
             ),
         )
+
+
+def pose_of(tick: Tick, truth: Truth) -> Pose | None:
+    """The truth at this tick; None where nobody tells it, or the swarm's frame is not known yet."""
+    if not truth.known or tick.state.frame is None:
+        return None
+    return truth.position(tick.state.frame, tick.swarm), truth.velocity_ned.copy()
 
 
 def tick_topic(tick: Tick) -> topics.TickTopic:

@@ -1,6 +1,7 @@
 """Writes a recording while a flight goes on.
 
-On the way of a frame nothing is written: a `Tap` notes what passes, and the recorder writes it when the turn is over.
+On the way of a frame nothing is written: a `Tap` notes what passes. When a turn of the loop is over, its set-points
+have left, and it is time, the recorder writes whatever turns it has noted: several at once cost less than one by one.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, NamedTuple
 
 import orjson
 from mcap_protobuf.schema import build_file_descriptor_set
@@ -20,7 +21,7 @@ from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
 from gcs.recording import topics
 from gcs.recording.decoded import SCHEMA, decoded, schema
 from gcs.recording.decoded import topic as decoded_topic
-from gcs.recording.own_topics import OwnTopics, tick_topic
+from gcs.recording.own_topics import OwnTopics, Pose, pose_of, tick_topic
 from gcs.recording.rotation import About, Channel, Rotation
 from gcs.recording.viewers import Viewers
 from gcs.shielded import in_words
@@ -34,6 +35,23 @@ PROMPTLY_NS = 80_000_000
 IN_LARGE_CHUNKS_NS = 1_000_000_000
 """For flights that can: fewer, larger chunks cost less."""
 OPTIONS = orjson.OPT_SERIALIZE_NUMPY
+
+
+class Passed(NamedTuple):
+    """Frames of one turn of the loop."""
+
+    came: list[Frame]
+    went: list[tuple[int, bytes]]
+    """When, and what."""
+
+
+class Turn(NamedTuple):
+    """One turn of the loop, to be written."""
+
+    tick: Tick
+    passed: Passed
+    pose: Pose | None
+    """The truth, as it was at this tick."""
 
 
 class Recorder:
@@ -60,12 +78,13 @@ class Recorder:
         about = About(scenario.model_dump_json(indent=1).encode(), metadata, start_ns)
         self._path, self._say = path, say
         self._files = Rotation(path, about, say)
-        self._own = OwnTopics(scenario, truth, reception)
+        self._truth = truth
+        self._own = OwnTopics(scenario, reception)
         self._viewers = Viewers(scenario)
         self._framer = Framer()
         self._decodes = decodes
-        self._came: list[Frame] = []
-        self._went: list[tuple[int, bytes]] = []
+        self._passed = Passed([], [])
+        self._turns: list[Turn] = []
         self._flush_ns, self._flushed_ns = flush_ns, start_ns
         self._defect: str | None = None
 
@@ -84,24 +103,26 @@ class Recorder:
         return self._defect or self._files.problem
 
     def came(self, frames: list[Frame]) -> None:
-        """Note frames that were received, to be written when the turn is over."""
-        self._came += frames
+        """Note frames that were received in this turn of the loop."""
+        self._passed.came.extend(frames)
 
     def went(self, time_ns: int, frame: bytes) -> None:
         """Note a frame that is being sent."""
-        self._went.append((time_ns, frame))
+        self._passed.went.append((time_ns, frame))
 
     def tick(self, tick: Tick) -> None:
-        """Write a turn of the loop, and whenever it is time, all that waits, to the disk."""
-        self._attempt(lambda: self._turn(tick))
+        """Note the turn that is over; whenever it is time, everything noted is written, and leaves the process."""
+        passed, self._passed = self._passed, Passed([], [])
+        self._attempt(lambda: self._noted(Turn(tick, passed, pose_of(tick, self._truth))))
 
     def add_metadata(self, name: str, values: dict[str, str]) -> None:
         """What is known only in the end, and is no part of the promise of same seed, same bytes."""
         self._attempt(lambda: self._files.metadata(name, values))
 
     def close(self) -> None:
-        """Write what an interrupted turn left, and the summary."""
-        self._attempt(self._frames)
+        """Write what is left, of an interrupted turn too, and the summary."""
+        self._attempt(self._write)
+        self._attempt(lambda: self._frames(self._passed))
         self._attempt(self._files.finish)
         self._files.close()
 
@@ -114,22 +135,33 @@ class Recorder:
                 self._defect = f"{self._path}: the recording stopped: {in_words(error)}"
                 self._say(f"gcs: {self._defect}; the flight goes on without it")
 
-    def _turn(self, tick: Tick) -> None:
-        self._frames()
-        time_ns, add = tick.time_ns, self._files.add
-        for topic, message in self._own.of(tick):
+    def _noted(self, turn: Turn) -> None:
+        self._turns.append(turn)
+        time_ns = turn.tick.time_ns
+        if time_ns - self._flushed_ns >= self._flush_ns:
+            self._flushed_ns = time_ns
+            self._write()
+            self._files.flush(time_ns)
+
+    def _write(self) -> None:
+        turns, self._turns = self._turns, []
+        for turn in turns:
+            self._turn(turn)
+
+    def _turn(self, turn: Turn) -> None:
+        """Its frames, then what is said of them; /tick ends it."""
+        self._frames(turn.passed)
+        tick, add = turn.tick, self._files.add
+        time_ns = tick.time_ns
+        for topic, message in self._own.of(tick, turn.pose):
             add(_json(topic, message.__class__), time_ns, orjson.dumps(message, option=OPTIONS))
         for topic, kind, data in self._viewers.of(tick):
             add(_protobuf(topic, kind), time_ns, data)  # type: ignore[arg-type]  # mypy has no class hashed
         add(_json("/tick", topics.TickTopic), time_ns, orjson.dumps(tick_topic(tick), option=OPTIONS))
-        if time_ns - self._flushed_ns >= self._flush_ns:
-            self._flushed_ns = time_ns
-            self._files.flush(time_ns)
 
-    def _frames(self) -> None:
-        """Those noted since the last turn, in the order in which they passed: what came, then what went."""
-        came, went = self._came, self._went
-        self._came, self._went = [], []
+    def _frames(self, passed: Passed) -> None:
+        """In the order in which they passed: what came, then what went."""
+        came, went = passed
         add, own = self._files.add, _raw(GROUND_SYSTEM, GROUND_COMPONENT)
         for time_ns, system, component, _, _, raw in came:
             add(_raw(system, component), time_ns, raw)
