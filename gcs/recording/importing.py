@@ -50,7 +50,10 @@ def import_tlog(path: Path, *, out: Path | None, console: Any) -> int:
                 "skipped_bytes": str(log.skipped),
             },
         )
-    for problem in clock.problems():
+    problems = clock.problems()
+    if log.skipped > len(data) / 2:
+        problems.append("most of it is no frame behind a time: is it a .tlog?")
+    for problem in problems:
         say(f"gcs: {path}: {problem}")
     skipped = f"; {log.skipped} of {len(data)} bytes were none" if log.skipped else ""
     line = f"{out.resolve()}: {senders.frames} frames of {senders.count} senders{skipped}"

@@ -1,7 +1,8 @@
 """The .tlog of MAVProxy, QGroundControl and Mission Planner: each frame behind eight bytes of time.
 
 Page: https://ardupilot.org/dev/docs/mavlink-basics.html ("telemetry log"); µs since 1970, big-endian. A frame vouches
-for itself by its CRC. Nothing vouches for a time: one that strays from those of its neighbours is taken for damage.
+for itself by its CRC, but for its signature. Nothing vouches for a time: one that strays from those of its neighbours
+is taken for damage.
 """
 
 from __future__ import annotations
@@ -71,17 +72,34 @@ class Entries:
 
     def _entries(self) -> Iterator[Entry]:
         at: int | None = 0
+        due = 0
+        """Where the next entry begins, if what the one before says of its length is true."""
         while at is not None:
-            found = _candidate(self._data, at)
-            if found is not None and self._believed(found):
-                yield found.entry
-                at += _TIME.size + len(found.entry.raw)
+            shape = _shape(self._data, at)
+            entry = self._entry(at, shape)
+            if shape is not None and entry is not None and (at == due or self._goes_on(shape.end)):
+                yield entry
+                at = due = shape.end
             else:
+                due = shape.end if shape is not None and at == due else due
                 at = _next_magic(self._data, at + 1)
 
-    def _believed(self, found: _Candidate) -> bool:
-        extra = _CRC_EXTRA.get(found.message)
-        return found.extra == (self._unknown.get(found.message, -1) if extra is None else extra)
+    def _goes_on(self, at: int) -> bool:
+        """Whether an entry or the end of the log is there: behind damage, eight bytes alone may be anything."""
+        return at == len(self._data) or self._entry_at(at) is not None
+
+    def _entry_at(self, at: int) -> Entry | None:
+        return self._entry(at, _shape(self._data, at))
+
+    def _entry(self, at: int, shape: _Shape | None) -> Entry | None:
+        """The entry of this shape that begins there, if its time is one and its CRC is right."""
+        if shape is None or (time_us := _TIME.unpack_from(self._data, at)[0]) >= LAST_TIME_US:
+            return None
+        extra = _CRC_EXTRA.get(shape.message)
+        if extra is None:
+            extra = self._unknown.get(shape.message)
+        right = extra is not None and extra == _implied_extra(self._data, at, shape)
+        return Entry(time_us, self._data[at + _TIME.size : shape.end]) if right else None
 
     @cached_property
     def _unknown(self) -> dict[int, int]:
@@ -89,22 +107,25 @@ class Entries:
         told: Counter[tuple[int, int]] = Counter()
         at: int | None = 0
         while at is not None:
-            found = _candidate(self._data, at)
-            if found is None:
+            shape = _shape(self._data, at)
+            extra = None if shape is None else _implied_extra(self._data, at, shape)
+            if shape is None or extra is None:
                 at = _next_magic(self._data, at + 1)
                 continue
-            if found.message not in _CRC_EXTRA:
-                told[found.message, found.extra] += 1
-            at += _TIME.size + len(found.entry.raw)
+            if shape.message not in _CRC_EXTRA:
+                told[shape.message, extra] += 1
+            at = shape.end
         return {message: extra for (message, extra), times in reversed(told.most_common()) if times > 1}
 
 
-class _Candidate(NamedTuple):
-    """What may be an entry: its CRC is right if its message has this CRC_EXTRA."""
+class _Shape(NamedTuple):
+    """What the header of an entry claims."""
 
-    entry: Entry
     message: int
-    extra: int
+    stop: int
+    """Where the payload ends and the CRC begins."""
+    end: int
+    """Of the entry."""
 
 
 _CRC_EXTRA = {number: kind.crc_extra for number, kind in dialect.mavlink_map.items()}
@@ -113,28 +134,27 @@ _LAST_STEP = {_checksum(bytes([byte]), 0): byte for byte in range(256)}
 """What the last byte of a message adds to its checksum → that byte."""
 
 
-def _candidate(data: bytes, at: int) -> _Candidate | None:
-    """The entry that may begin there, whole."""
+def _shape(data: bytes, at: int) -> _Shape | None:
+    """Of the entry that may begin there, if all its bytes are there."""
     start = at + _TIME.size
-    if len(data) < start + HEADER_1 + CRC or (time_us := _TIME.unpack_from(data, at)[0]) >= LAST_TIME_US:
-        return None
-    tail = CRC
-    if data[start] == MAGIC_2 and len(data) >= start + HEADER_2 and not data[start + 2] & ~SIGNED:
-        stop = start + HEADER_2 + data[start + 1]
-        tail += SIGNATURE * (data[start + 2] & SIGNED)
-        message = data[start + 7] | data[start + 8] << 8 | data[start + 9] << 16
-    elif data[start] == MAGIC_1:
-        stop = start + HEADER_1 + data[start + 1]
-        message = data[start + 5]
+    header = data[start : start + HEADER_2]
+    if len(header) == HEADER_2 and header[0] == MAGIC_2 and not header[2] & ~SIGNED:
+        stop = start + HEADER_2 + header[1]
+        end = stop + CRC + SIGNATURE * (header[2] & SIGNED)
+        message = header[7] | header[8] << 8 | header[9] << 16
+    elif len(header) >= HEADER_1 and header[0] == MAGIC_1:
+        stop = start + HEADER_1 + header[1]
+        end, message = stop + CRC, header[5]
     else:
         return None
-    if len(data) < stop + tail:
-        return None
-    before = _checksum(data[start + 1 : stop])
-    last = _LAST_STEP.get((data[stop] | data[stop + 1] << 8) ^ before >> 8)
-    if last is None:
-        return None
-    return _Candidate(Entry(time_us, data[start : stop + tail]), message, last ^ before & 0xFF)
+    return _Shape(message, stop, end) if end <= len(data) else None
+
+
+def _implied_extra(data: bytes, at: int, shape: _Shape) -> int | None:
+    """The CRC_EXTRA with which this CRC is right; of most wrong ones there is none."""
+    before = _checksum(data[at + _TIME.size + 1 : shape.stop])
+    last = _LAST_STEP.get((data[shape.stop] | data[shape.stop + 1] << 8) ^ before >> 8)
+    return None if last is None else last ^ before & 0xFF
 
 
 _MAGIC = re.compile(bytes([ord("["), MAGIC_2, MAGIC_1, ord("]")]))
