@@ -6,6 +6,7 @@ Flights of ours, and what was imported from another ground station's log: frames
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +17,7 @@ from mcap.reader import SeekingReader
 from gcs.choices import BadUsageError
 from gcs.recording import history as flights
 from gcs.recording.files import SCENARIO
-from gcs.recording.history import Happening, History
+from gcs.recording.history import Happening, History, Kind
 from gcs.recording.reader import RECORD_SIZE_LIMIT, UnreadableRecording, located, readable
 from gcs.replay.index import Gap, gaps, times
 from gcs.replay.senders import Senders, sender, senders
@@ -24,6 +25,7 @@ from wire.ids import AUTOPILOT
 
 STEP_NS = 100_000_000
 """Between two steps through a recording without ticks."""
+TLOG = ".tlog"
 READ_S = 0.05
 """Times are shown to a tenth of a second: what is shown can be asked for."""
 _SECONDS = re.compile(r"(-?)(?:(\d+):(?=[0-5]?\d(?:\.|$)))?(\d+(?:\.\d*)?)")
@@ -99,13 +101,21 @@ class Timeline:
         for happening in self.happenings:
             if asked and asked.casefold() in happening.words.casefold():
                 return happening.time_ns + 1
-        told = "; ".join(dict.fromkeys(happening.words for happening in self.happenings)) or "none"
-        raise BadUsageError(f"{option}{asked}: neither seconds (12.5, 1:05) nor words of an event; there are: {told}")
+        told = [happening.words for happening in self.happenings if happening.kind is not Kind.WORD]
+        raise BadUsageError(
+            f"{option}{asked}: neither seconds (12.5, 1:05) nor words of an event; there are: {_listed(told)}"
+        )
+
+
+def _listed(words: Iterable[str]) -> str:
+    return "; ".join(dict.fromkeys(words)) or "none"
 
 
 def load(path: Path) -> Timeline:
     """Of a recording, or of the one in a run's folder. Raises UnreadableRecording."""
     path = located(path)
+    if path.suffix == TLOG:
+        raise UnreadableRecording(f"{path}: a log of frames; gcs log import makes a recording of it")
     with readable(path), path.open("rb") as stream:
         reader = SeekingReader(stream, validate_crcs=True, record_size_limit=RECORD_SIZE_LIMIT)
         summary = reader.get_summary()

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import termios
 import time
+from pathlib import Path
 
 import pytest
 from flights import GCS, SHORT, messages, recorded, scratch, start
@@ -188,11 +189,16 @@ def test_a_torn_recording_is_refused_with_what_rebuilds_it(gcs):
     assert err.count("\n") == 1
 
 
+def free_port():
+    """A number that no UDP socket has at this moment."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        return free.getsockname()[1]
+
+
 @pytest.mark.wall_clock
 def test_a_ground_control_station_meets_all_six_vehicles_and_nobody_else():
-    with contextlib.closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}", source_system=254)
     station.port.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4 << 20)  # it is slower than ten times real time
     heard, began = {}, time.monotonic()
@@ -214,6 +220,21 @@ def test_a_ground_control_station_meets_all_six_vehicles_and_nobody_else():
     up = [message.z for message in heard["LOCAL_POSITION_NED"][4, 1]]
     assert min(up) < -9.0
     assert max(up) > -1.0
+
+
+@pytest.mark.wall_clock
+def test_mavsdk_meets_all_six_and_sees_where_they_were():
+    path, port = recorded("demo", *SHORT).path, free_port()
+    with start(sys.executable, Path(__file__).with_name("see_mavsdk.py"), port, 6) as client:
+        assert any(line == "listening\n" for line in client.stdout)
+        words = ("replay", path, "--from", "0", "--to", f"udpout:127.0.0.1:{port}")
+        with start(GCS, *words, stdin=subprocess.DEVNULL) as replay:
+            said = client.stdout.read()
+            replay.kill()
+    (told,) = (line.removeprefix("seen: ") for line in said.splitlines() if line.startswith("seen: "))
+    seen = json.loads(told)
+    assert sorted(seen) == ["1", "2", "3", "4", "5", "6"]
+    assert all(-12.0 < down < -8.0 for _, _, down in seen.values())
 
 
 class Attended:
@@ -280,9 +301,7 @@ def replay():
 
 @pytest.mark.wall_clock
 def test_with_keys_on_a_terminal_which_is_stopped_and_left_as_it_was():
-    with Attended(
-        f"{replay()}; echo stopped; stty -a | tr '\\n' ' '; fg; echo code $?; stty -a | tr '\\n' ' '"
-    ) as seen:
+    with Attended(f"{replay()}; echo stopped; {MODES}; fg; echo code $?; {MODES}") as seen:
         seen.see(rb"\x1b\[\?1049h")
         seen.see(rb"since mission start")
         seen.type(b" ")

@@ -129,6 +129,11 @@ def test_an_empty_recording_cannot_be_played():
         timeline.load(path)
 
 
+def test_a_log_of_frames_is_told_what_makes_a_recording_of_it(tmp_path):
+    with pytest.raises(UnreadableRecording, match="gcs log import makes a recording of it"):
+        timeline.load(tmp_path / "flight.tlog")
+
+
 def test_a_file_that_is_not_there_is_told_in_a_sentence(tmp_path):
     with pytest.raises(UnreadableRecording, match="No such file"):
         timeline.load(tmp_path / "nothing.mcap")
