@@ -90,7 +90,7 @@ def _topics(found: Inventory) -> Table:
     table = Table(box=box.SIMPLE_HEAD)
     table.add_column("topic", overflow="fold")
     table.add_column("what", overflow="fold")
-    for heading in ("messages", "Hz each", "kB"):
+    for heading in ("messages", "Hz", "kB"):
         table.add_column(heading, justify="right", no_wrap=True)
     for name, of, group in _grouped(found.listed):
         messages, size = sum(one.messages for one in group), sum(one.bytes for one in group)
