@@ -25,7 +25,8 @@ from gcs.recording.seal import is_sealed
 
 _INDEX, _ENTRY = struct.Struct("<HI"), struct.Struct("<QQ")
 """How the index of a chunk's messages begins: channel, and the length of its entries; time and place of each."""
-_DATA_END_LENGTH = 4
+_NO_CRC = bytes(4)
+"""At the end of the data, where nobody reckoned one."""
 _FOOTER_BYTES = 29
 
 
@@ -222,7 +223,9 @@ def _unexplained(data: bytes, start: int, stop: int, told: _Messages, after_ns: 
     while at < stop:
         opcode, length = RECORD.unpack_from(data, at) if at + RECORD.size <= stop else (0, 0)
         body = data[at + RECORD.size : min(at + RECORD.size + length, stop)]
-        if opcode == Opcode.DATA_END and length == _DATA_END_LENGTH and stop == len(data):
+        if opcode == Opcode.DATA_END and stop == len(data):
+            if body not in (_NO_CRC, zlib.crc32(data[:at]).to_bytes(4, "little")):
+                yield Damage(at, RECORD.size + length, after_ns, None)
             return  # the summary has a CRC of its own, and is rebuilt
         header = opcode == Opcode.HEADER and at == len(MAGIC)
         if len(body) < length or not (header or (opcode == Opcode.MESSAGE_INDEX and _indexes(body, told))):
