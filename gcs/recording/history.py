@@ -35,6 +35,7 @@ from gcs.recording.reader import (
     points,
     rating_of,
 )
+from gcs.recording.recovery import RECOVERED
 from gcs.track import Parts, Track
 from scenarios import Scenario
 
@@ -131,10 +132,6 @@ class History:
     """What `gcs log recover` found, lost and added, where it made this recording."""
     autopilot: Integers
     """(N,) MAV_AUTOPILOT of the heartbeats; 0 where none came."""
-
-
-RECOVERED = "recovered"
-"""The metadata record that tells what `gcs log recover` found, lost and added."""
 
 
 def load(path: Path) -> History:

@@ -17,6 +17,7 @@ from gcs.console import write
 from gcs.recording.files import METADATA
 from gcs.recording.inventory import Inventory, Listed, inventory
 from gcs.recording.reader import CUT_SHORT, located
+from gcs.recording.recovery import RECOVERED
 from gcs.summary import trust_of
 from gcs.words import controller_name, faults
 
@@ -56,6 +57,8 @@ def _lines(found: Inventory) -> Iterator[tuple[str, str]]:
         yield "seed", about["seed"]
     if found.versions:
         yield "versions", ", ".join(f"{name} {number}" for name, number in found.versions.items())
+    if RECOVERED in found.metadata:
+        yield "recovered", found.metadata[RECOVERED]["words"]
     for part in found.parts:
         yield "goes on in", f"{part.name}, {_size(part.stat().st_size)}"
     if found.journal is not None:
@@ -139,6 +142,7 @@ def _json(found: Inventory) -> dict[str, Any]:
         "versions": found.versions,
         "passed": found.summary.get("passed"),
         "problem": found.summary.get("problem", None if scenario is None else CUT_SHORT),
+        "recovered": found.metadata.get(RECOVERED),
         "parts": [str(part.resolve()) for part in found.parts],
         "journal": None if found.journal is None else str(found.journal.resolve()),
         "bytes_per_vehicle_minute": found.bytes_per_vehicle_minute,

@@ -16,11 +16,10 @@ from gcs.console import write
 from gcs.output import check_free, whole
 from gcs.recording import files
 from gcs.recording.files import DROPPED, METADATA, PART, SCENARIO
-from gcs.recording.history import RECOVERED
 from gcs.recording.mcap_file import McapFile
 from gcs.recording.merge import completed
 from gcs.recording.reader import UnreadableRecording, located
-from gcs.recording.recovery import Part, Recovery
+from gcs.recording.recovery import RECOVERED, Part, Recovery
 from gcs.recording.salvage import Rescued, Salvaged, salvage
 from gcs.recording.seal import SEAL, sealed
 from gcs.recording.tlog import Entries
@@ -46,6 +45,8 @@ def recover(path: Path, *, journal: Path | None, out: Path | None, as_json: bool
 
 def rebuilt(path: Path, *, journal: Path | None, out: Path) -> Recovery:
     """The same, without a word."""
+    if path.suffix == files.journal(path).suffix:
+        raise UnreadableRecording(f"{path}: no recording: gcs log import makes one of it")
     check_free(out)
     if journal is None and files.journal(path).exists():
         journal = files.journal(path)

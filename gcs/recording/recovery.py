@@ -9,6 +9,9 @@ from typing import Any
 
 from gcs.recording.salvage import Damage
 
+RECOVERED = "recovered"
+"""The metadata record in which a rebuilt recording tells all this."""
+
 
 @dataclass(frozen=True, slots=True)
 class Part:

@@ -264,6 +264,7 @@ def test_parts_are_joined_and_what_the_disk_did_not_take_is_told(parts, true):
     assert found == true[:third] + true[2 * third :]
     assert recovery.dropped == third
     assert read(recovery.out).scenario.swarm.count == 2
+    assert f"{third} messages that the disk did not take" in load(recovery.out).recovered["words"]
 
 
 def test_the_frames_that_the_disk_did_not_take_come_from_the_journal(parts, true):
@@ -313,6 +314,12 @@ def test_a_file_of_which_nothing_is_left_is_refused_in_a_sentence(content, gcs, 
     assert (code, out) == (2, "")
     assert err.count("\n") == 1
     assert "no MCAP file, or no message of it is left" in err
+
+
+def test_a_journal_alone_is_to_be_imported(true, gcs, tmp_path):
+    (tmp_path / "run.tlog").write_bytes(journal_of(true))
+    code, _, err = gcs("log", "recover", tmp_path / "run.tlog")
+    assert (code, err) == (2, f"gcs: {tmp_path / 'run.tlog'}: no recording: gcs log import makes one of it\n")
 
 
 def test_refusals_of_torn_recordings_name_the_command_that_rebuilds_them(small, tmp_path):
