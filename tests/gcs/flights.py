@@ -25,7 +25,7 @@ from gcs.loop import fly
 from gcs.mission import plan
 from gcs.recording.reader import Flown, read
 from gcs.session import AS_IN_RUN, flown
-from gcs.summary import Summary
+from gcs.summary import Reception, Summary
 from scenarios import Scenario, load
 from wire.modes import ARDUCOPTER_MODES, PX4_MODES
 
@@ -77,6 +77,20 @@ class Counting(Beside):
     def send(self, system, frame):
         self.sent.append((system, frame))
         self._link.send(system, frame)
+
+
+class Arriving(Beside):
+    """A link that hands every frame to somebody, too, as it comes."""
+
+    def __init__(self, link, arrived):
+        super().__init__(link)
+        self._arrived = arrived
+
+    def receive(self):
+        frames = self._link.receive()
+        for frame in frames:
+            self._arrived(frame)
+        return frames
 
 
 class Severed(Beside):
@@ -167,6 +181,7 @@ def fly_and_record(
     ratings=None,
     autopilot="px4",
     recording=AS_IN_RUN,
+    reception=Reception,
     say=lambda _words: None,
 ):
     """The same, not shared. through: wraps (link, clock);  events: what an operator says at each tick."""
@@ -186,6 +201,7 @@ def fly_and_record(
         watching=watching,
         ratings=ratings,
         recording=recording,
+        reception=reception,
         say=say,
     )
     return Recorded(scenario, summary, folder, link)

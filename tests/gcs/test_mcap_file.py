@@ -2,11 +2,10 @@
 
 import hashlib
 import io
-import resource
-import signal
 from pathlib import Path
 
 import pytest
+from disks import Limited
 from flights import scratch
 from hypothesis import given
 from hypothesis import strategies as st
@@ -148,22 +147,6 @@ def prefix(data):
         pass
 
 
-class Disk:
-    """A limit to the size of what this process writes, as of a disk that is full: a write may stop half way."""
-
-    def __init__(self, size):
-        self._size = size
-
-    def __enter__(self):
-        self._before = resource.getrlimit(resource.RLIMIT_FSIZE)
-        self._handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (self._size, self._before[1]))
-
-    def __exit__(self, *_error):
-        resource.setrlimit(resource.RLIMIT_FSIZE, self._before)
-        signal.signal(signal.SIGXFSZ, self._handler)
-
-
 def random(number):
     return hashlib.sha512(b"%d" % number).digest()
 
@@ -183,7 +166,7 @@ def test_a_chunk_that_the_disk_took_half_of_is_cut_off_again(paths, room):
     path, _ = paths
     file, channel = file_of(path, 3)
     before = path.read_bytes()
-    with Disk(len(before) + room):
+    with Limited(len(before) + room):
         file.add(channel, 4, random(4))
         file.add(channel, 5, random(5))
         with pytest.raises(OSError, match="File too large"):
@@ -199,7 +182,7 @@ def test_a_file_that_had_no_room_for_its_end_is_finished_when_there_is(paths):
     file, _ = file_of(path, 3)
     before = path.read_bytes()
     for room in (3, 100, 400):
-        with Disk(len(before) + room), pytest.raises(OSError, match="File too large"):
+        with Limited(len(before) + room), pytest.raises(OSError, match="File too large"):
             file.finish()
         assert path.read_bytes() == before
     file.finish()
@@ -215,7 +198,7 @@ def test_a_dropped_chunk_is_in_no_summary(paths):
     other = file.channel("/late", "json", file.schema("Late", "jsonschema", b"{}"))
     file.add(channel, 10**9, random(8))
     file.add(other, 10**9, random(9))
-    with Disk(path.stat().st_size + 20), pytest.raises(OSError, match="File too large"):
+    with Limited(path.stat().st_size + 20), pytest.raises(OSError, match="File too large"):
         file.flush()
     file.finish()
     summary = reader(path.read_bytes()).get_summary()
