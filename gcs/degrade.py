@@ -40,7 +40,8 @@ def degrading(scenario: Scenario, system: int) -> Scenario:
 class Degraded:
     """A link to a fleet one of whose vehicles does not fly what it is told, though it believes it does.
 
-    A fault's time counts from mission start: the first set-point to any vehicle that moves it sideways, and the run-up
+    Recording and journal lie before it, so that both hold what the controller sent, as if the fault were on board. A
+    fault's time counts from mission start: the first set-point to any vehicle that moves it sideways, and the run-up
     behind it, as far as a link can know.
     """
 

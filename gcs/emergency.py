@@ -27,7 +27,7 @@ class LastResort:
     """
 
     def __init__(self, link: Link, clock: Clock, ids: Iterable[int], say: Callable[[str], None]) -> None:
-        """link, clock: as they are, without recorder or display in between."""
+        """link, clock: without recorder or display in between; a journal may be, which keeps no frame from leaving."""
         self._link = link
         self._clock = clock
         self._say = say

@@ -8,14 +8,16 @@ import signal
 import socket
 import subprocess
 import sys
+from collections import Counter
 from contextlib import closing
 
 import orjson
 import pytest
-from flights import GCS, SHORT, recorded, start
+from disks import Limited
+from flights import GCS, SHORT, messages, recorded, start
 
 from gcs import flying
-from gcs.output import output_folder, room
+from gcs.output import make_room, output_folder, room
 from gcs.replay.verify import decide_again
 
 CONTRACT = {
@@ -376,15 +378,23 @@ def test_a_polite_kill_lands_the_swarm_too(tmp_path):
     assert decide_again(tmp_path / "run.mcap").difference is None
 
 
-def test_a_disk_that_fills_up_stops_the_recording_and_not_the_flight(gcs, tmp_path):
+def test_a_disk_that_is_full_before_take_off_is_refused(gcs, tmp_path):
     (tmp_path / "run.mcap").symlink_to("/dev/full")
     code, out, err = gcs("run", "demo", *BRIEFLY, "--out", tmp_path, "--json")
+    assert (code, out) == (2, "")
+    assert err == f"gcs: {tmp_path}/run.mcap: the recording cannot be written: No space left on device\n"
+
+
+def test_a_disk_that_fills_up_in_flight_is_told_and_counts_as_a_problem_of_the_flight(gcs, tmp_path):
+    with Limited(150_000):
+        code, out, err = gcs("run", "demo", *BRIEFLY, "--out", tmp_path, "--json")
     assert code == 3
     result = orjson.loads(out)
-    assert "the recording stopped: No space left on device" in result["problem"]
+    assert "run.mcap: the recording stopped: File too large" in result["problem"]
     assert result["heading_error_deg"] is not None
     assert result["passed"] is False
     assert "Traceback" not in err
+    assert err.index("run.mcap: the recording stopped") < err.index("run.part2.mcap: the recording goes on")
 
 
 @pytest.mark.parametrize("file", ["summary.json", "trajectory.png"])
@@ -414,7 +424,7 @@ def test_a_flight_leaves_less_than_the_room_it_asks_for():
     for flight in (recorded("emergency"), recorded("demo")):
         share = flight.summary.simulated_s / flight.scenario.time.timeout_s
         left = sum(path.stat().st_size for path in flight.folder.iterdir())
-        assert 0.2 * room(flight.scenario) * share < left < room(flight.scenario)
+        assert 0.1 * room(flight.scenario) * share < left < room(flight.scenario)
 
 
 def test_an_earlier_recording_in_the_same_folder_is_kept(gcs, tmp_path):
@@ -424,6 +434,34 @@ def test_an_earlier_recording_in_the_same_folder_is_kept(gcs, tmp_path):
     (kept,) = tmp_path.glob("run-*.mcap")
     assert kept.read_bytes() == first
     assert str(kept) in err
+
+
+def test_its_journal_and_its_further_parts_are_kept_with_it(tmp_path):
+    left = {"run.mcap": b"1", "run.tlog": b"journal", "run.part2.mcap": b"2", "run.part10.mcap": b"10"}
+    for name, data in left.items():
+        (tmp_path / name).write_bytes(data)
+    for _ in range(2):
+        kept = make_room(tmp_path)
+        found = {path.name.replace(kept.stem, "run"): path.read_bytes() for path in tmp_path.glob(f"{kept.stem}.*")}
+        assert found == left
+        assert not [name for name in left if (tmp_path / name).exists()]
+        for name, data in left.items():
+            (tmp_path / name).write_bytes(data)
+
+
+def test_a_journal_whose_recording_is_gone_is_kept_too(tmp_path):
+    (tmp_path / "run.tlog").write_bytes(b"journal")
+    kept = make_room(tmp_path)
+    assert (kept.suffix, kept.read_bytes()) == (".tlog", b"journal")
+
+
+def test_messages_are_recorded_as_json_where_that_is_asked_for(gcs, tmp_path):
+    code, _, _ = gcs("run", "demo", *BRIEFLY, "--record-decoded", "--out", tmp_path)
+    assert code == 0
+    topics = Counter(topic for topic, _, _ in messages(tmp_path / "run.mcap"))
+    assert topics["/mavlink/1_1/LOCAL_POSITION_NED"] == topics["/mavlink/6_1/LOCAL_POSITION_NED"] > 100
+    assert topics["/mavlink/255_190/SET_POSITION_TARGET_LOCAL_NED"] > 100
+    assert decide_again(tmp_path / "run.mcap").difference is None
 
 
 def test_what_people_write_is_not_taken_for_markup(gcs, tmp_path):

@@ -8,11 +8,12 @@ from contextlib import closing
 
 import orjson
 import pytest
-from flights import FDM, GCS, SHORT, fly_and_record, start
+from flights import FDM, GCS, SHORT, fly_and_record, messages, start
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from gcs.events import LAND
 from gcs.recording.reader import read, ticks
+from gcs.recording.tlog import entries
 from gcs.replay.verify import decide_again
 from wire.frames import Framer, decode
 
@@ -78,6 +79,24 @@ def test_the_summary_says_how_each_vehicle_was_heard_and_that_nothing_was_refuse
 def test_the_recording_has_what_the_controller_sent_and_can_be_decided_again(degraded):
     folder, _ = degraded
     assert decide_again(folder / "run" / "run.mcap").difference is None
+
+
+@pytest.mark.wall_clock
+def test_the_journal_has_the_same_frames_as_the_recording_in_the_same_order(degraded):
+    """Both have what the controller sent: it is bent behind them, as it would be on board."""
+    path = degraded[0] / "run" / "run.mcap"
+    recorded = [data for topic, _, data in messages(path) if topic.endswith("/raw")]
+    noted = [entry.raw for entry in entries(path.with_suffix(".tlog"))]
+    assert noted[: len(recorded)] == recorded
+    assert len(noted) - len(recorded) < 20  # that came when the last turn of the loop was over
+
+
+@pytest.mark.wall_clock
+def test_the_recording_tells_once_a_second_how_each_vehicle_was_heard(degraded):
+    folder, summary = degraded
+    links = [orjson.loads(data) for topic, _, data in messages(folder / "run" / "run.mcap") if topic == "/link"]
+    assert len(links) == pytest.approx(summary["simulated_s"], abs=3)
+    assert all(min(link["received"]) > 0 for link in links[2:])
 
 
 @pytest.mark.wall_clock

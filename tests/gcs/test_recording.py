@@ -15,11 +15,14 @@ from mcap.records import Chunk, Footer
 from mcap.stream_reader import StreamReader
 
 from gcs.events import Rating
+from gcs.link_quality import LinkQuality
 from gcs.recording import topics
+from gcs.recording.decoded import decoded as read_message
 from gcs.recording.reader import UnreadableRecording, read
 from gcs.recording.writer import PROMPTLY_NS
 from gcs.scoring import score
 from gcs.session import Recording
+from gcs.summary import Reception
 from scenarios import Scenario
 from wire.frames import Framer
 
@@ -185,6 +188,60 @@ def test_a_fault_that_comes_and_goes_is_told_each_time():
     assert [fault["mission_s"] for fault in faults] == pytest.approx([3.0, 6.2, 11.0, 14.2, 19.0, 22.2])
     assert {fault["vehicle"] for fault in faults} == {5}
     assert faults[0]["definition"]["period_s"] == 8.0
+
+
+@pytest.fixture(scope="module")
+def decoded():
+    """A flight of a few seconds with its messages as JSON."""
+    return fly_and_record("demo", "time.timeout_s=3", recording=Recording(decodes=True))
+
+
+def test_every_frame_is_there_as_json_too_if_that_is_asked_for(decoded):
+    framer, held = Framer(), messages(decoded.path)
+    frames = [framer.frames(time_ns, data)[0] for topic, time_ns, data in held if topic.endswith("/raw")]
+    expected = [(f"/mavlink/{f.system}_{f.component}/{name}", f.time_ns, data)
+                for f in frames for name, data in filter(None, [read_message(f)])]  # fmt: skip
+    found = [message for message in held if message[0].startswith("/mavlink/") and not message[0].endswith("/raw")]
+    assert sorted(found) == sorted(expected)
+    assert len(found) == len(frames) > 500
+
+
+def test_every_decoded_message_is_what_its_schema_says(decoded):
+    checked = set()
+    with decoded.path.open("rb") as stream:
+        for schema, channel, message in SeekingReader(stream).iter_messages():
+            if channel.topic.startswith("/mavlink/") and channel.message_encoding == "json":
+                assert schema.name == f"mavlink.{channel.topic.rsplit('/')[-1]}"
+                check(orjson.loads(message.data), orjson.loads(schema.data))
+                checked.add(schema.name)
+    assert checked >= {"mavlink.HEARTBEAT", "mavlink.LOCAL_POSITION_NED", "mavlink.COMMAND_LONG", "mavlink.SIM_STATE"}
+
+
+class Heard:
+    """How vehicles are heard by a link that knows: one loses frames, one is not heard at all."""
+
+    def __init__(self):
+        self._calls = 0
+
+    def __call__(self):
+        self._calls += 1
+        quality = {1: LinkQuality(received=100 * self._calls), 2: LinkQuality(90, 10, 3, 1)}
+        return Reception.of({"bad checksum": 2, "a stranger": 0}, quality)
+
+
+def test_how_vehicles_are_heard_is_told_once_a_second_where_the_link_knows():
+    short = ("time.timeout_s=3", "swarm.rows=1", "swarm.columns=3", "swarm.leaders=[1]")
+    flight = fly_and_record("demo", *short, reception=Heard())
+    content = told(flight, "/link")
+    assert [link["tick"] for link in content] == list(range(0, len(told(flight, "/tick")), 10))
+    assert [link["received"] for link in content] == [[100 * (turn + 1), 90, 0] for turn in range(len(content))]
+    assert {key: content[0][key] for key in ("lost", "reordered", "duplicated", "rejected")} == {
+        "lost": [0, 10, 0], "reordered": [0, 3, 0], "duplicated": [0, 1, 0], "rejected": {"bad checksum": 2},
+    }  # fmt: skip
+    assert flight.summary.loss == {"1": 0.0, "2": 0.1}
+    with flight.path.open("rb") as stream:
+        for schema, _, message in SeekingReader(stream).iter_messages(topics=["/link"]):
+            check(orjson.loads(message.data), orjson.loads(schema.data))
 
 
 KINDS = {
