@@ -1,4 +1,4 @@
-"""MAVProxy, as somebody types into it, flies an ArduCopter over UDP."""
+"""MAVProxy, as somebody types into it, flies an ArduCopter over UDP; its log is a recording of ours."""
 
 import os
 import re
@@ -9,16 +9,21 @@ from pathlib import Path
 
 import pytest
 from in_flight import LOOPBACK, process, vehicle
+from mcap.reader import make_reader
 
 from fdm.parameters import table
+from gcs.console import stdout
+from gcs.recording.importing import import_tlog
+from wire.frames import LONGEST
 
 pytestmark = pytest.mark.wall_clock
 
 LIMIT_S = 15.0
 CRUISE, WITHIN = 3.0, 0.1  # m/s
 MAVPROXY = Path(sys.executable).with_name("mavproxy.py")
-QUIETLY = ["--no-state", "--streamrate=10", "--heartbeat-rate=3"]
-"""Nothing is kept on disk; a heartbeat every simulated second, for the simulation is as much faster than the client."""
+LOG = "flight.tlog"
+OPTIONS = [f"--logfile={LOG}", "--streamrate=10", "--heartbeat-rate=3"]
+"""A heartbeat every simulated second, for the simulation is as much faster than the client."""
 
 
 class Console:
@@ -60,7 +65,7 @@ def console(tmp_path):
     screen = tmp_path / "screen.txt"
     alone = os.environ | {"HOME": str(tmp_path), "PYTHONUNBUFFERED": "1"}
     with vehicle("ardupilot", tmp_path) as port:
-        command = [sys.executable, str(MAVPROXY), f"--master=udpin:{LOOPBACK}:{port}", *QUIETLY]
+        command = [sys.executable, str(MAVPROXY), f"--master=udpin:{LOOPBACK}:{port}", *OPTIONS]
         options = {"stdin": subprocess.PIPE, "text": True, "cwd": tmp_path, "env": alone}
         with process(command, screen, **options) as running:
             try:
@@ -91,7 +96,7 @@ def set_to(console, name, value):
     until(lambda: float(console.ask(f"param show {name}", rf"{name} +(\S+)\n")[1]) == value)
 
 
-def test_it_reads_parameters_changes_modes_and_flies_an_arducopter_from_arming_to_disarming(console):
+def test_it_reads_parameters_changes_modes_and_flies_an_arducopter_from_arming_to_disarming(console, tmp_path):
     """It sends one set-point for each `velocity` that is typed, in the body's frame: this one is headed east."""
     own = table("ardupilot")
     console.see(f"Received {len(own)} parameters")
@@ -121,3 +126,14 @@ def test_it_reads_parameters_changes_modes_and_flies_an_arducopter_from_arming_t
     console.see("DISARMED")
     assert told(console, "z") == pytest.approx(0.0, abs=0.1)
     assert "fence breach" not in console.shown()
+    assert_its_log_is_imported(tmp_path / LOG)
+
+
+def assert_its_log_is_imported(log):
+    """Every byte of it is a frame, but for one that is being written."""
+    recording = log.with_suffix(".mcap")
+    assert import_tlog(log, out=recording, console=stdout()) == 0
+    with recording.open("rb") as stream:
+        (told,) = make_reader(stream).iter_metadata()
+    assert int(told.metadata["frames"]) > 1000
+    assert int(told.metadata["skipped_bytes"]) < 8 + LONGEST
