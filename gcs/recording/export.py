@@ -10,6 +10,7 @@ from mcap.records import Channel, Message
 from rich import box
 from rich.table import Table as Listing
 
+from gcs.guard import DONE
 from gcs.output import check_free, whole, whole_folder
 from gcs.recording import tables
 from gcs.recording.contents import RAW, frame_of, frames, records
@@ -38,7 +39,7 @@ def export(path: Path, *, to: Form, out: Path | None, console: Any) -> int:
         out = path.with_name(f"{path.stem}{NAMES[to]}")
     check_free(out)
     FORMS[to](path, out, console)
-    return 0
+    return DONE
 
 
 def _say(console: Any, line: str) -> None:

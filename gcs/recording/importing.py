@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from gcs.console import say
+from gcs.guard import DONE
 from gcs.output import check_free, whole
 from gcs.recording.contents import RAW, frame_of
 from gcs.recording.decoded import DecodedTopics
@@ -40,16 +41,7 @@ def import_tlog(path: Path, *, out: Path | None, console: Any) -> int:
             senders.add(entry)
         if not senders.frames:
             raise UnreadableRecording(f"{path}: no .tlog: there is no MAVLink frame behind a time in it")
-        file.metadata(
-            IMPORTED,
-            {
-                "file": path.name,
-                "bytes": str(len(data)),
-                "sha256": hashlib.sha256(data).hexdigest(),
-                "frames": str(senders.frames),
-                "skipped_bytes": str(log.skipped),
-            },
-        )
+        file.metadata(IMPORTED, _origin(path, data, senders.frames, log.skipped))
     problems = clock.problems()
     if log.skipped > len(data) / 2:
         problems.append("most of it is no frame behind a time: is it a .tlog?")
@@ -58,7 +50,17 @@ def import_tlog(path: Path, *, out: Path | None, console: Any) -> int:
     skipped = f"; {log.skipped} of {len(data)} bytes were none" if log.skipped else ""
     line = f"{out.resolve()}: {senders.frames} frames of {senders.count} senders{skipped}"
     console.print(line, highlight=False, soft_wrap=True, markup=False)
-    return 0
+    return DONE
+
+
+def _origin(path: Path, data: bytes, frames: int, skipped: int) -> dict[str, str]:
+    return {
+        "file": path.name,
+        "bytes": str(len(data)),
+        "sha256": hashlib.sha256(data).hexdigest(),
+        "frames": str(frames),
+        "skipped_bytes": str(skipped),
+    }
 
 
 class _Senders:
