@@ -9,7 +9,7 @@ written ────────────────────────
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,6 +34,10 @@ class Channel:
     """Empty where the encoding speaks for itself."""
     schema_encoding: str = ""
     schema: bytes = b""
+
+
+Message = tuple[Channel, int, bytes]
+"""With its time, ns since 1970, and its payload."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,18 +86,18 @@ class Rotation:
         on = f"; it goes on in {part(self._path, self._number).name}" if self._number > 1 else ""
         return f"{self._path}: the recording stopped: {self._why}; {self.dropped} messages are missing{on}"
 
-    def add(self, channel: Channel, time_ns: int, data: bytes) -> None:
-        """One message; lost, and counted, while the disk takes nothing."""
-        if self._file is None:
-            self.dropped += 1
+    def add(self, messages: Sequence[Message]) -> None:
+        """In their order; lost, and counted, while the disk takes nothing."""
+        file, ids = self._file, self._ids
+        if file is None:
+            self.dropped += len(messages)
             return
-        number = self._ids.get(channel)
-        if number is None:
-            number = self._define(self._file, channel)
         try:
-            self._file.add(number, time_ns, data)
+            file.extend(
+                [(ids.get(kind) or self._define(file, kind), time_ns, data) for kind, time_ns, data in messages]
+            )
         except OSError as error:
-            self._stop(self._file, error)
+            self._stop(file, error)
 
     def metadata(self, name: str, values: dict[str, str]) -> None:
         """Words about the whole, in the part being written."""

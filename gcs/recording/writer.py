@@ -6,8 +6,9 @@ have left, and it is time, the recorder writes whatever turns it has noted: seve
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -22,7 +23,7 @@ from gcs.recording import topics
 from gcs.recording.decoded import SCHEMA, decoded, schema
 from gcs.recording.decoded import topic as decoded_topic
 from gcs.recording.own_topics import OwnTopics, Pose, pose_of, tick_topic
-from gcs.recording.rotation import About, Channel, Rotation
+from gcs.recording.rotation import About, Channel, Message, Rotation
 from gcs.recording.viewers import Viewers
 from gcs.shielded import in_words
 from gcs.summary import Reception
@@ -122,7 +123,7 @@ class Recorder:
     def close(self) -> None:
         """Write what is left, of an interrupted turn too, and the summary."""
         self._attempt(self._write)
-        self._attempt(lambda: self._frames(self._passed))
+        self._attempt(lambda: self._files.add(self._frames(self._passed)))
         self._attempt(self._files.finish)
         self._files.close()
 
@@ -146,37 +147,27 @@ class Recorder:
     def _write(self) -> None:
         turns, self._turns = self._turns, []
         for turn in turns:
-            self._turn(turn)
+            self._files.add([*self._frames(turn.passed), *self._topics(turn.tick, turn.pose)])
 
-    def _turn(self, turn: Turn) -> None:
-        """Its frames, then what is said of them; /tick ends it."""
-        self._frames(turn.passed)
-        tick, add = turn.tick, self._files.add
-        time_ns = tick.time_ns
-        for topic, message in self._own.of(tick, turn.pose):
-            add(_json(topic, message.__class__), time_ns, orjson.dumps(message, option=OPTIONS))
-        for topic, kind, data in self._viewers.of(tick):
-            add(_protobuf(topic, kind), time_ns, data)  # type: ignore[arg-type]  # mypy has no class hashed
-        add(_json("/tick", topics.TickTopic), time_ns, orjson.dumps(tick_topic(tick), option=OPTIONS))
-
-    def _frames(self, passed: Passed) -> None:
+    def _frames(self, passed: Passed) -> list[Message]:
         """In the order in which they passed: what came, then what went."""
         came, went = passed
-        add, own = self._files.add, _raw(GROUND_SYSTEM, GROUND_COMPONENT)
-        for time_ns, system, component, _, _, raw in came:
-            add(_raw(system, component), time_ns, raw)
-        for time_ns, raw in went:
-            add(own, time_ns, raw)
+        ours = _raw(GROUND_SYSTEM, GROUND_COMPONENT)
+        messages = [(_raw(system, component), time_ns, raw) for time_ns, system, component, _, _, raw in came]
+        messages += [(ours, time_ns, raw) for time_ns, raw in went]
         if self._decodes:
-            ours = (frame for time_ns, raw in went for frame in self._framer.frames(time_ns, raw))
-            for frame in (*came, *ours):
-                self._decoded(frame)
+            read = chain(came, *(self._framer.frames(time_ns, raw) for time_ns, raw in went))
+            messages += [message for frame in read for message in _decoded(frame)]
+        return messages
 
-    def _decoded(self, frame: Frame) -> None:
-        read = decoded(frame)
-        if read is not None:
-            name, data = read
-            self._files.add(_message(frame.system, frame.component, name), frame.time_ns, data)
+    def _topics(self, tick: Tick, pose: Pose | None) -> Iterator[Message]:
+        """What is said of a turn; /tick ends it."""
+        time_ns = tick.time_ns
+        for topic, message in self._own.of(tick, pose):
+            yield _json(topic, message.__class__), time_ns, orjson.dumps(message, option=OPTIONS)
+        for topic, kind, data in self._viewers.of(tick):
+            yield _protobuf(topic, kind), time_ns, data  # type: ignore[arg-type]  # mypy has no class hashed
+        yield _json("/tick", topics.TickTopic), time_ns, orjson.dumps(tick_topic(tick), option=OPTIONS)
 
 
 class Tap:
@@ -205,6 +196,13 @@ class Tap:
 @cache
 def _raw(system: int, component: int) -> Channel:
     return Channel(f"/mavlink/{system}_{component}/raw", "mavlink")
+
+
+def _decoded(frame: Frame) -> Iterator[Message]:
+    read = decoded(frame)
+    if read is not None:
+        name, data = read
+        yield _message(frame.system, frame.component, name), frame.time_ns, data
 
 
 @cache

@@ -257,7 +257,7 @@ def test_the_operators_second_ctrl_c_passes_a_display():
         )  # fmt: skip
 
 
-@pytest.mark.parametrize("method", ["channel", "add", "flush", "finish"])
+@pytest.mark.parametrize("method", ["channel", "extend", "flush", "finish"])
 def test_a_defect_in_the_recording_is_said_at_once_and_does_not_end_the_flight(method, monkeypatch):
     calls, sound = iter(range(10**9)), getattr(McapFile, method)
 
