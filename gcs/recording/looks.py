@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -15,8 +16,8 @@ from gcs.trust_colour import trust_colour
 
 Array = npt.NDArray[np.float64]
 
-SHADES = 20
-"""Steps of trust: what changes by less looks as before."""
+SHADES, UNASKED = 20, -1.0
+"""Steps of trust: what changes by less looks as before; and the one that stands for a trust that nobody asked for."""
 WORDS = "leads", "distrusted", "left behind", "silent", "not ours"
 
 
@@ -34,7 +35,13 @@ class Look(NamedTuple):
 
 def shades(trust: Array) -> list[tuple[float, float, float]]:
     """Red, green, blue of each vehicle, of trusts (N,)."""
-    return list(map(tuple, trust_colour(np.round(trust * SHADES) / SHADES).tolist()))
+    return list(map(_shade, np.nan_to_num(np.round(trust * SHADES), nan=UNASKED).tolist()))
+
+
+@cache
+def _shade(step: float) -> tuple[float, float, float]:
+    red, green, blue = trust_colour(np.nan if step == UNASKED else step / SHADES).tolist()
+    return red, green, blue
 
 
 def looks(tick: Tick, parts: Parts, trust: Array) -> list[Look]:
