@@ -123,8 +123,9 @@ def parts_of(tick: Tick) -> Parts | None:
     memory, ids = tick.state.memory, tick.swarm.ids
     if memory is None:
         return None
-    leaders, left = ((ids[row] for row in rows) for rows in (memory.roles.leaders, np.flatnonzero(memory.roles.left)))
-    return Parts(tick.diagnosis.mission_s, tuple(leaders), tuple(left))
+    leaders = tuple(ids[row] for row in memory.roles.leaders.tolist())
+    left = tuple(system for system, so in zip(ids, memory.roles.left.tolist(), strict=True) if so)
+    return Parts(tick.diagnosis.mission_s, leaders, left)
 
 
 def changed(before: Parts, after: Parts) -> bool:

@@ -62,9 +62,10 @@ class Transforms:
     def at(self, tick: Tick) -> bytes:
         """Of all vehicles, once the swarm's frame is known. Whose attitude was not told is level and heads north."""
         seconds, nanoseconds = divmod(tick.time_ns, 1_000_000_000)
-        position = position_enu(tick)
-        places = _grained(np.vstack([position, position.mean(axis=0)]), GRAIN_M)
-        for (time, place, _), (east, north, up) in zip(self._parts, places.tolist(), strict=True):
+        places = np.empty((len(self._parts), 3))
+        places[:-1] = position_enu(tick)
+        places[-1] = places[:-1].sum(axis=0) / len(places[:-1])
+        for (time, place, _), (east, north, up) in zip(self._parts, _grained(places, GRAIN_M).tolist(), strict=True):
             time.seconds, time.nanos = seconds, nanoseconds
             place.x, place.y, place.z = east, north, up
         self._turn(tick.swarm.attitude_rpy)
