@@ -86,7 +86,13 @@ def live(scenario: Scenario, request: Request, hardware: Hardware) -> int:
         def reception() -> Reception:
             return Reception.of(vehicles.rejections, vehicles.quality)
 
-        way = Way(connections, reception=reception, flush_ns=PROMPTLY_NS, listens=vehicles.tell)
+        way = Way(
+            connections,
+            reception=reception,
+            flush_ns=PROMPTLY_NS,
+            listens=vehicles.tell,
+            faults_made=hardware.degrade is not None,
+        )
         return flight(scenario, request, link, vehicles, ratings, way)
 
 
@@ -104,6 +110,8 @@ class Way:
     """How long anything may wait to be recorded."""
     listens: Callable[[Callable[[Frame], None]], None] | None = None
     """Hands a journal every frame as it arrives; None where the flight can be flown again, and needs none."""
+    faults_made: bool = True
+    """Whether the link makes the scenario's faults; otherwise they are left to the vehicles."""
 
 
 IN_LOCKSTEP = Way()
@@ -157,6 +165,7 @@ def flight(
             ratings=ratings,
             recording=Recording(way.flush_ns, request.decodes, journal),
             reception=way.reception,
+            faults_made=way.faults_made,
         )
     _report(summary, folder, json=request.json)
     if operator.interrupted:

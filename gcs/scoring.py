@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy.typing as npt
 
 from gcs.mission import plan
 from gcs.track import Track
-from scenarios import Scenario, healthy_robots, offsets_ne
+from scenarios import Scenario, offsets_ne
 
 Array = npt.NDArray[np.float64]
 
@@ -35,9 +36,11 @@ class Score:
     """As the first, of all robots."""
     passed: bool
     detected: dict[int, float]
-    """Seconds from a fault's onset until the vehicle's trust fell below 0.5, of those that were found."""
+    """Seconds from its first fault's onset until the vehicle's trust fell below 0.5, of those that were found."""
     false_alarms: int
-    """Vehicles whose trust was below 0.5 at any time before a fault of theirs, if they had one."""
+    """Vehicles whose trust was below 0.5 at any time before a fault of theirs, if they had one; none where nobody knows
+    who had.
+    """
 
 
 def score(track: Track, scenario: Scenario) -> Score | None:
@@ -46,7 +49,8 @@ def score(track: Track, scenario: Scenario) -> Score | None:
     if track.time_s[-1] < path.read_out_s - 1e-9:
         return None
     hand_over, read_out = (int(np.searchsorted(track.time_s, t - 1e-9)) for t in (path.hand_over_s, path.read_out_s))
-    scored = scored_robots(scenario)
+    scored = scored_robots(scenario, known=track.faults_known)
+    struck = onsets(scenario, until_s=path.read_out_s) if track.faults_known else None
     place = track.position[..., :2] - offsets_ne(scenario)
     leg = path.segments[-1].velocity_ne
     error = abs(heading_error(place[hand_over, scored].mean(0), place[read_out, scored].mean(0), leg))
@@ -63,24 +67,39 @@ def score(track: Track, scenario: Scenario) -> Score | None:
             and distance <= expect.distance_to_target_m
             and separation >= expect.min_separation_m
         ),
-        detected=_detected(track, scenario),
-        false_alarms=int(((track.trust < DISTRUSTED) & _sound(track, scenario)).any(axis=0).sum()),
+        detected={} if struck is None else _detected(track, struck),
+        false_alarms=0 if struck is None else _false_alarms(track, struck),
     )
 
 
-def scored_robots(scenario: Scenario) -> npt.NDArray[np.bool_]:
-    """(N,) whom a flight is judged by: the healthy; where nobody is, all."""
-    healthy = healthy_robots(scenario)
+def onsets(scenario: Scenario, *, until_s: float = math.inf) -> dict[int, float]:
+    """System id → seconds since mission start at which the first of its faults began to act, of those before `until_s`.
+
+    Faults that are blamed on nobody, as wind on everyone, are left out.
+    """
+    first_s: dict[int, float] = {}
+    for fault in scenario.fault:
+        if fault.blamed is not None and fault.onset_s < until_s - 1e-9:
+            first_s[fault.blamed] = min(first_s.get(fault.blamed, math.inf), fault.onset_s)
+    return first_s
+
+
+def scored_robots(scenario: Scenario, *, known: bool = True) -> npt.NDArray[np.bool_]:
+    """(N,) whom a flight is judged by: those without a fault up to the read-out; where nobody is, all.
+
+    known: whether the scenario's faults are known to be the vehicles'; where nobody knows, all are judged alike.
+    """
+    healthy = np.ones(scenario.swarm.count, bool)
+    if known:
+        healthy[[system - 1 for system in onsets(scenario, until_s=plan(scenario).read_out_s)]] = False
     return healthy if healthy.any() else ~healthy
 
 
-def _sound(track: Track, scenario: Scenario) -> npt.NDArray[np.bool_]:
-    """(T, N) who has had no fault yet: what is held against it is a false alarm."""
-    onset_s = np.full(scenario.swarm.count, np.inf)
-    for fault in scenario.fault:
-        if fault.blamed is not None:
-            onset_s[fault.blamed - 1] = min(onset_s[fault.blamed - 1], fault.onset_s)
-    return np.asarray(track.time_s[:, None] < onset_s - 1e-9)
+def _false_alarms(track: Track, onset_s: Mapping[int, float]) -> int:
+    """Who was distrusted while it had had no fault yet."""
+    first_s = np.array([onset_s.get(system, math.inf) for system in range(1, track.trust.shape[1] + 1)])
+    sound = track.time_s[:, None] < first_s - 1e-9
+    return int(((track.trust < DISTRUSTED) & sound).any(axis=0).sum())
 
 
 def heading_error(start_ne: Array, end_ne: Array, wanted_ne: Array) -> float:
@@ -106,13 +125,10 @@ def separation(position: Array) -> Array:
     return closest
 
 
-def _detected(track: Track, scenario: Scenario) -> dict[int, float]:
+def _detected(track: Track, onset_s: Mapping[int, float]) -> dict[int, float]:
     found: dict[int, float] = {}
-    for fault in scenario.fault:
-        blamed = fault.blamed
-        if blamed is None or blamed in found:
-            continue
-        below = track.time_s[(track.trust[:, blamed - 1] < DISTRUSTED) & (track.time_s >= fault.onset_s - 1e-9)]
+    for system, first_s in onset_s.items():
+        below = track.time_s[(track.trust[:, system - 1] < DISTRUSTED) & (track.time_s >= first_s - 1e-9)]
         if below.size:
-            found[blamed] = round(float(below[0]) - fault.onset_s, 6)
+            found[system] = round(float(below[0]) - first_s, 6)
     return found

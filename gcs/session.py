@@ -17,7 +17,7 @@ from gcs.flight_state import FlightState, left_behind
 from gcs.loop import Clock, Link, Record, fly
 from gcs.operator import Operator
 from gcs.output import PICTURE
-from gcs.recording.files import SUMMARY
+from gcs.recording.files import FAULTS, MADE, PLANNED, SUMMARY
 from gcs.recording.journal import Journal, Journaled
 from gcs.recording.reader import RECORDING
 from gcs.recording.writer import IN_LARGE_CHUNKS_NS, Recorder, Tap
@@ -60,19 +60,21 @@ def flown(
     ratings: Sequence[Rating] | None = None,
     recording: Recording = AS_IN_RUN,
     reception: Callable[[], Reception] = Reception,
+    faults_made: bool = True,
     say: Callable[[str], None] = console.say,
 ) -> Summary:
     """Fly a scenario over a link; leaves run.mcap, summary.json and trajectory.png in `out`.
 
     name: how the summary calls the scenario;  watching: builds what shows the flight while it goes on;
     ratings: known beforehand, () where only live ones may come, None where nobody rates.
-    reception: tells how the vehicles were heard, where the link knows.
+    reception: tells how the vehicles were heard, where the link knows;  faults_made: whether the link makes the
+    scenario's faults, and they are not left to vehicles behind it.
     A recording or a display that fails is said at once and in the summary; the flight goes on. Any other error of the
     loop lands the fleet before it is raised. Raises RecordingError before take-off where `out` cannot be written.
     """
     flight = Flight(scenario, ratings=ratings)
     truth = Truth(flight.ids)
-    tracker = Tracker(flight, truth)
+    tracker = Tracker(flight, truth, faults_made=faults_made)
     if recording.journal is not None:
         link = Journaled(link, clock, recording.journal)
     began = time.perf_counter()
@@ -81,10 +83,11 @@ def flown(
         scenario,
         truth,
         start_ns=clock.now(),
-        metadata=_metadata(name, seed, ratings),
+        metadata=_metadata(name, seed, ratings, faults_made=faults_made),
         flush_ns=recording.flush_ns,
         decodes=recording.decodes,
         reception=reception,
+        faults_made=faults_made,
         say=say,
     )
     with recorder:
@@ -141,12 +144,13 @@ def _written(summary: Summary, track: Track | None, scenario: Scenario, out: Pat
     return summary
 
 
-def _metadata(name: str, seed: int | None, ratings: Sequence[Rating] | None) -> dict[str, str]:
-    """Versions, seed, who rates and wall time: outside the promise of same seed, same bytes."""
+def _metadata(name: str, seed: int | None, ratings: Sequence[Rating] | None, *, faults_made: bool) -> dict[str, str]:
+    """Versions, seed, who rates, whose the faults are and wall time: outside the promise of same seed, same bytes."""
     return {
         "scenario": name,
         "seed": "" if seed is None else str(seed),
         "ratings": "" if ratings is None else "known beforehand" if ratings else "live",
+        FAULTS: MADE if faults_made else PLANNED,
         "started": dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
         **installed(),
     }

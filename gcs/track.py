@@ -31,10 +31,17 @@ class Track:
     """True where positions are telemetry, because no simulation told the truth."""
     parts: tuple[Parts, ...] = ()
     """At mission start, and whenever they changed; none where nothing tells."""
+    faults_known: bool = True
+    """Whether the scenario's faults are known to act: a simulation tells its truth, or we made them ourselves."""
 
     @staticmethod
-    def of(points: Sequence[Point], *, read_out_s: float, parts: Sequence[Parts] = ()) -> Track | None:
-        """A track of points in the order of time, as far as the first at the read-out; None of no points."""
+    def of(
+        points: Sequence[Point], *, read_out_s: float, parts: Sequence[Parts] = (), faults_made: bool = False
+    ) -> Track | None:
+        """A track of points in the order of time, as far as the first at the read-out; None of no points.
+
+        faults_made: whether we made the scenario's faults ourselves, whatever the vehicles tell.
+        """
         before = sum(point.time_s < read_out_s - 1e-9 for point in points)
         points = points[: before + 1]
         if not points:
@@ -44,7 +51,8 @@ class Track:
             position=np.array([point.position for point in points]),
             trust=np.array([point.trust for point in points]),
             virtual_ne=np.array([point.virtual_ne for point in points]),
-            measured=any(point.measured for point in points),
+            measured=(measured := any(point.measured for point in points)),
+            faults_known=faults_made or not measured,
             parts=tuple(part for part in parts if part.time_s <= points[-1].time_s),
         )
 
@@ -76,8 +84,9 @@ class Point:
 class Tracker:
     """A `Record` that keeps the track in memory."""
 
-    def __init__(self, flight: Flight, truth: Truth) -> None:
-        self._truth = truth
+    def __init__(self, flight: Flight, truth: Truth, *, faults_made: bool = False) -> None:
+        """faults_made: whether we make the scenario's faults ourselves, whatever the vehicles tell."""
+        self._truth, self._faults_made = truth, faults_made
         self._read_out_s = flight.plan.read_out_s
         self._points: list[Point] = []
         self._parts: list[Parts] = []
@@ -92,7 +101,7 @@ class Tracker:
     @property
     def track(self) -> Track | None:
         """All that was kept; None where the mission never began."""
-        return Track.of(self._points, read_out_s=self._read_out_s, parts=self._parts)
+        return Track.of(self._points, read_out_s=self._read_out_s, parts=self._parts, faults_made=self._faults_made)
 
     def _keep_parts(self, tick: Tick) -> None:
         parts = parts_of(tick)

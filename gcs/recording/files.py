@@ -9,6 +9,10 @@ SCENARIO = "scenario.json"
 """The attachment that holds the scenario flown."""
 METADATA, SUMMARY = "trustr", "summary"
 """Names of the metadata records: what was flown, and what came of it."""
+FAULTS, MADE, PLANNED = "faults", "made", "planned"
+"""Key of METADATA: whether we made the scenario's faults ourselves, or vehicles behind a link are to bring them along;
+older recordings do not say.
+"""
 PART, DROPPED = "part", "dropped_messages"
 """Keys of METADATA: which of the recording's files this is, from 1, and how many messages no file before it holds."""
 

@@ -57,7 +57,7 @@ class Happening:
 
 @dataclass(frozen=True, slots=True)
 class FaultSpan:
-    """While a fault acted, as the simulation told it."""
+    """While a fault acted, where it is known that it did (`History.faults_by`)."""
 
     vehicle: int | None
     """Who is blamed; None of what strikes everyone."""

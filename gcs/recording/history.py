@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -19,10 +19,9 @@ import numpy.typing as npt
 from gcs import words
 from gcs.events import Rating
 from gcs.flight_state import Phase
-from gcs.mission import plan
 from gcs.recording import happenings as find
 from gcs.recording import sentences
-from gcs.recording.files import METADATA
+from gcs.recording.files import FAULTS, MADE, METADATA
 from gcs.recording.happenings import FaultSpan, Found, Happening, Kind
 from gcs.recording.heard import Heard, Told, column, held
 from gcs.recording.reader import (
@@ -32,18 +31,20 @@ from gcs.recording.reader import (
     located,
     opened,
     parts_of,
-    points,
     rating_of,
+    track_of,
 )
 from gcs.recording.recovery import RECOVERED
+from gcs.scoring import onsets
 from gcs.track import Parts, Track
 from scenarios import Scenario
 
-__all__ = ["FaultSpan", "Happening", "History", "Kind", "Links", "load"]
+__all__ = ["FaultSpan", "FaultsBy", "Happening", "History", "Kind", "Links", "load"]
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 Integers = npt.NDArray[np.int64]
+FaultsBy = Literal["made", "planned", "unknown"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,6 +122,7 @@ class History:
     parts: tuple[Parts, ...]
     """Who led and who was left behind, whenever it changed."""
     faults: tuple[FaultSpan, ...]
+    """In the order in which they began; none where nobody knows."""
     happenings: tuple[Happening, ...]
     """In the order of time."""
     links: Links | None
@@ -132,6 +134,27 @@ class History:
     """What `gcs log recover` found, lost and added, where it made this recording."""
     autopilot: Integers
     """(N,) MAV_AUTOPILOT of the heartbeats; 0 where none came."""
+    faults_by: FaultsBy = "made"
+    """Whence it is known what was wrong: "made" by the one who flew it, in simulation or on the link; "planned" by the
+    scenario, of a simulation behind a link that is taken to fly the same; "unknown" where vehicles told no truth.
+    """
+
+    @property
+    def acted(self) -> tuple[FaultSpan, ...]:
+        """The faults that began before the mission was read out, or came to its end: those it can be told of."""
+        return tuple(span for span in self.faults if span.from_s < self._until_s - 1e-9)
+
+    @property
+    def onsets(self) -> dict[int, float]:
+        """System id → seconds since mission start at which the first fault blamed on it began, of those that `acted`.
+
+        Whoever is not in it was healthy, as far as is known: scores are by the same (gcs.scoring.onsets).
+        """
+        return {} if self.faults_by == "unknown" else onsets(self.scenario, until_s=self._until_s)
+
+    @property
+    def _until_s(self) -> float:
+        return -math.inf if self.track is None else float(self.track.time_s[-1])
 
 
 def load(path: Path) -> History:
@@ -157,6 +180,7 @@ def _history(path: Path, recording: Recording, heard: Heard) -> History:
     truth = column(told["/truth/pose"], "position_m", number, n, 3)
     commanded = column(setpoint, "commanded", number, n) > 0.0
     parts = tuple(map(parts_of, heard.events["/roles"]))
+    faults_by = _faults_by(recording.metadata[METADATA], measured=not told["/truth/pose"])
     return History(
         path=path,
         scenario=scenario,
@@ -188,14 +212,24 @@ def _history(path: Path, recording: Recording, heard: Heard) -> History:
         virtual_velocity_ne=_pair(mission, "velocity_north_m_s", "velocity_east_m_s", number),
         ratings=tuple(map(rating_of, heard.events["/ratings"])),
         parts=parts,
-        faults=tuple(_spans(heard.events["/truth/fault"], scenario)),
+        faults=() if faults_by == "unknown" else tuple(_spans(heard.events["/truth/fault"], scenario)),
         happenings=(),
         links=_links(told["/link"], heard.link_times),
-        track=Track.of(list(points(told)), read_out_s=plan(scenario).read_out_s, parts=parts),
+        track=track_of(recording, told, parts),
         summary=recording.summary,
         recovered=recording.metadata.get(RECOVERED),
         autopilot=heard.autopilot,
+        faults_by=faults_by,
     )
+
+
+def _faults_by(metadata: Mapping[str, str], *, measured: bool) -> FaultsBy:
+    """Older recordings do not say: those of a simulation of ours have a seed."""
+    if FAULTS in metadata and metadata[FAULTS] == MADE:
+        return "made"
+    if measured:
+        return "unknown"
+    return "made" if FAULTS not in metadata and metadata.get("seed") else "planned"
 
 
 def _pair(told: Told, north: str, east: str, number: Integers) -> Array:

@@ -33,9 +33,13 @@ fast they move, (N, 3) m/s, north, east, down.
 class OwnTopics:
     """Remembers what is told only when it changes."""
 
-    def __init__(self, scenario: Scenario, reception: Callable[[], Reception]) -> None:
-        """reception: tells how the vehicles were heard; /link is where it knows."""
-        self._reception = reception
+    def __init__(self, scenario: Scenario, reception: Callable[[], Reception], *, faults_made: bool = False) -> None:
+        """reception: tells how the vehicles were heard; /link is where it knows.
+
+        faults_made: whether we make the scenario's faults ourselves. Where we do not, and vehicles do not tell their
+        truth, nobody knows whether anything is wrong with them.
+        """
+        self._reception, self._faults_made = reception, faults_made
         self._faults = scenario.fault
         self._active = [False] * len(scenario.fault)
         self._parts: Parts | None = None
@@ -54,6 +58,8 @@ class OwnTopics:
             )
         if diagnosis.virtual is not None:
             yield from self._mission(tick)
+            if self._faults_made or pose is not None:
+                yield from self._faulty(diagnosis.mission_s)
         if pose is not None:
             yield "/truth/pose", topics.PoseTopic(number, diagnosis.mission_s, *pose)
         for rating in diagnosis.ratings:
@@ -79,6 +85,9 @@ class OwnTopics:
             yield from self._roles(tick)
         if diagnosis.belief is not None and diagnosis.belief.evidence is not None:
             yield "/evidence", _evidence_topic(number, mission_s, diagnosis.belief)
+
+    def _faulty(self, mission_s: float) -> Iterator[Said]:
+        """What the scenario has begin and end."""
         for index, fault in enumerate(self._faults):
             if fault.active(mission_s) != self._active[index]:
                 self._active[index] = not self._active[index]

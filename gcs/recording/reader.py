@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +19,7 @@ from pydantic import ValidationError
 from gcs.events import Event, Rating
 from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
 from gcs.mission import plan
-from gcs.recording.files import METADATA, SCENARIO, SUMMARY
+from gcs.recording.files import FAULTS, MADE, METADATA, SCENARIO, SUMMARY
 from gcs.track import Parts, Point, Track
 from scenarios import Scenario, names
 from wire.frames import Frame, Framer
@@ -166,8 +166,20 @@ def read(path: Path) -> Flown:
                 parts.append(parts_of(orjson.loads(message.data)))
         scenario = recording.scenario
         rated = recording.metadata[METADATA].get("ratings", "") != ""
-        track = Track.of(list(points(told)), read_out_s=plan(scenario).read_out_s, parts=parts)
+        track = track_of(recording, told, parts)
         return Flown(path, scenario, rated, recording.problem, track)
+
+
+def track_of(
+    recording: Recording, told: Mapping[str, Mapping[int, Mapping[str, Any]]], parts: Sequence[Parts]
+) -> Track | None:
+    """The mission of a recording, for its score. told: topic → tick → what it told."""
+    return Track.of(
+        list(points(told)),
+        read_out_s=plan(recording.scenario).read_out_s,
+        parts=parts,
+        faults_made=recording.metadata[METADATA].get(FAULTS) == MADE,
+    )
 
 
 def points(told: Mapping[str, Mapping[int, Mapping[str, Any]]]) -> Iterator[Point]:

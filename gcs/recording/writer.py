@@ -69,10 +69,12 @@ class Recorder:
         flush_ns: int = IN_LARGE_CHUNKS_NS,
         decodes: bool = False,
         reception: Callable[[], Reception] = Reception,
+        faults_made: bool = False,
         say: Callable[[str], None] = console.say,
     ) -> None:
         """flush_ns: how long anything may wait to be written;  decodes: write frames' messages as JSON, too.
 
+        faults_made: whether we make the scenario's faults ourselves, whatever the vehicles tell.
         reception: tells how the vehicles were heard, where the link knows;  say: what to do with a sentence about a
         recording that stops, or goes on. Raises RecordingError.
         """
@@ -80,7 +82,7 @@ class Recorder:
         self._path, self._say = path, say
         self._files = Rotation(path, about, say)
         self._truth = truth
-        self._own = OwnTopics(scenario, reception)
+        self._own = OwnTopics(scenario, reception, faults_made=faults_made)
         self._viewers = Viewers(scenario)
         self._framer = Framer()
         self._decodes = decodes

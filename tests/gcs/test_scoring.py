@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gcs.mission import paper_leader, plan
-from gcs.scoring import heading_error, min_separation, score
+from gcs.scoring import heading_error, min_separation, onsets, score
 from gcs.track import Track
 from scenarios import healthy_robots, load, offsets_ne
 
@@ -140,6 +140,29 @@ def test_a_robot_is_sound_until_the_first_of_its_faults_and_never_again():
     scenario = load("transit", overrides=[f"fault=[{late}, {early}]"])
     assert score(distrusted(ideal(scenario), 5, 3.0, 8.0), scenario).false_alarms == 0
     assert score(distrusted(ideal(scenario), 5, 2.9, 8.0), scenario).false_alarms == 1
+
+
+@pytest.mark.parametrize("order", [(9, 3), (3, 9)])
+def test_a_detection_counts_from_the_first_of_a_robots_faults_in_whatever_order_they_are_written(order):
+    faults = ",".join(f'{{vehicle=5, kind="frozen_telemetry", onset_s={onset_s}}}' for onset_s in order)
+    scenario = load("transit", overrides=[f"fault=[{faults}]"])
+    assert onsets(scenario) == {5: 3.0}
+    assert score(distrusted(ideal(scenario), 5, 4.5), scenario).detected == {5: pytest.approx(1.5)}
+
+
+def test_a_fault_that_begins_after_the_read_out_leaves_its_robot_healthy():
+    scenario = load("transit", overrides=["fault.0.onset_s=100"])
+    astray = moved(ideal(scenario), (0.0, 60.0), robots=4, since_s=20.0)
+    result = score(distrusted(astray, 5, 2.0), scenario)
+    assert (result.detected, result.false_alarms) == ({}, 1)
+    assert result.distance_to_target_m == pytest.approx(10.0)  # one of six that count
+
+
+def test_where_nobody_knows_what_was_wrong_nobody_is_right_or_wrong_to_distrust_and_all_are_scored():
+    track = replace(distrusted(moved(ideal(TRANSIT), (0.0, 60.0), robots=4), 5, 2.0), faults_known=False)
+    result = score(track, TRANSIT)
+    assert (result.detected, result.false_alarms) == ({}, 0)
+    assert result.distance_to_target_m == pytest.approx(10.0)
 
 
 def test_trust_of_exactly_one_half_is_trust():
