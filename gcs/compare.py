@@ -13,7 +13,7 @@ from rich.text import Text
 from gcs.recording.reader import Flown, UnreadableRecording, located, read
 from gcs.scoring import Score, score
 from gcs.summary import trust_of
-from gcs.words import controller_name, faults, robots
+from gcs.words import controller_name, ending, faults, robots
 
 FORMATS = (".png", ".pdf", ".svg")
 
@@ -74,11 +74,8 @@ def _left_behind(flight: Flown) -> tuple[int, ...]:
 
 
 def _verdict(flight: Flown, result: Score | None) -> Text:
-    if flight.problem is not None:
-        return Text(f"not completed: {flight.problem}", style="red")
-    if result is None:
-        return Text("no score", style="red")
-    return Text("passed", style="green") if result.passed else Text("failed", style="red")
+    ended = ending(flight.problem, None if result is None else result.passed)
+    return Text(str(ended), style="green" if ended.good else "red")
 
 
 def _draw(flights: Sequence[Flown], picture: Path) -> None:

@@ -22,7 +22,7 @@ from gcs.mission import Plan, plan
 from gcs.scoring import DISTRUSTED, Score, score, scored_robots
 from gcs.summary import trust_of
 from gcs.track import Parts, Track
-from gcs.words import controller_name, faults, robots
+from gcs.words import controller_name, ending, faults, measured, robots
 from scenarios import Scenario, healthy_robots, offsets_ne
 
 HEALTHY = ("#1f4e8c", "#2a7fba", "#3aa6a0", "#5b8def", "#6a7fb5", "#2c9c6a")
@@ -200,18 +200,12 @@ def _line(start: Any, end: Any) -> tuple[list[float], list[float]]:
 
 
 def _verdict(result: Score | None, panel: Panel) -> str:
-    if panel.problem is not None:
-        return "\n".join(wrap(f"NOT COMPLETED: {panel.problem}", width=TITLE))
-    if result is None:
-        return "ended before its read-out"
-    passed, expect = "passes" if result.passed else "FAILS", panel.scenario.expect
-    told = (
-        f"{passed}: heading off by {result.heading_error_deg:.1f}° (allowed {expect.heading_error_deg:g}°), "
-        f"{result.distance_to_target_m:.1f} m from target ({expect.distance_to_target_m:g} m)"
-    )
-    if result.min_separation_m >= expect.min_separation_m:
-        return told
-    return f"{told}\nrobots as close as {result.min_separation_m:.2f} m (allowed {expect.min_separation_m:g} m)"
+    ended = ending(panel.problem, None if result is None else result.passed)
+    word = ended.word if ended.good else ended.word.upper()
+    why = ended.why
+    if result is not None and not why:
+        why = ", ".join(measured(result, panel.scenario))
+    return "\n".join(wrap(f"{word}: {why}", width=TITLE))
 
 
 def _trust(axes: Any, panel: Panel, *, first: bool) -> None:

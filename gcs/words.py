@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
 
+from gcs.scoring import Score
 from gcs.summary import Summary
 from scenarios import (
     CompassBias,
@@ -98,18 +101,55 @@ def robots(systems: Sequence[int]) -> str:
     return f"{'robot' if len(systems) == 1 else 'robots'} {', '.join(map(str, systems))}"
 
 
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """How a flight ended, as everything that shows it calls it."""
+
+    word: Literal["passed", "failed", "no score", "not completed"]
+    why: str
+    """What the word does not say; "" where it says all."""
+
+    @property
+    def good(self) -> bool:
+        """Flown to its end, and well."""
+        return self.word == "passed"
+
+    def __str__(self) -> str:
+        """not completed: vehicle 3 fell silent."""
+        return f"{self.word}: {self.why}" if self.why else self.word
+
+
+def ending(problem: str | None, passed: bool | None) -> Ending:
+    """problem: why it could not be completed;  passed: None where there is no score."""
+    if problem is not None:
+        return Ending("not completed", problem)
+    if passed is None:
+        return Ending("no score", "it ended before its read-out")
+    return Ending("passed" if passed else "failed", "")
+
+
+def measured(score: Score, scenario: Scenario) -> Iterator[str]:
+    """What a flight is judged by, and what was allowed; the closest two robots only where they came too close."""
+    expect = scenario.expect
+    yield f"heading off by {score.heading_error_deg:.1f}° (allowed {expect.heading_error_deg:g}°)"
+    yield f"{score.distance_to_target_m:.1f} m from the target (allowed {expect.distance_to_target_m:g} m)"
+    if score.min_separation_m < expect.min_separation_m:
+        yield f"robots as close as {score.min_separation_m:.2f} m (allowed {expect.min_separation_m:g} m)"
+
+
 def verdict(summary: Summary) -> str:
     """Two or three lines: what was flown, and how it ended."""
     trust = "" if summary.trust is None else f", trust from {summary.trust}"
     flight = f"{summary.scenario}: {summary.controller}{trust}, {' and '.join(summary.faults) or 'no fault'}"
     if summary.heading_error_deg is None or summary.distance_to_target_m is None or summary.min_separation_m is None:
-        return f"{flight}\nended before its read-out: no score"
+        return f"{flight}\n{ending(summary.problem, None)}"
+    ended = ending(summary.problem, summary.passed)
     closest = summary.min_separation_m
     apart = "" if math.isinf(closest) else f", robots never closer than {closest:.1f} m"
     without = f", without {robots(summary.left_behind)}" if summary.left_behind else ""
     on = "" if summary.scored_on == "truth" else " (by telemetry: no truth was told)"
     return (
-        f"{flight}\n{'passed' if summary.passed else 'failed'}: heading off by {summary.heading_error_deg:.1f}°, "
+        f"{flight}\n{ended.word}: heading off by {summary.heading_error_deg:.1f}°, "
         f"{summary.distance_to_target_m:.1f} m from the target{apart}{without}{on}\n"
         f"{summary.simulated_s:.1f} s flown at {summary.real_time_factor:.0f} × real time"
     )

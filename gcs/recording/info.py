@@ -19,7 +19,7 @@ from gcs.recording.inventory import Inventory, Listed, inventory
 from gcs.recording.reader import CUT_SHORT, located
 from gcs.recording.recovery import RECOVERED
 from gcs.summary import trust_of
-from gcs.words import controller_name, faults
+from gcs.words import controller_name, ending, faults
 
 
 def show(path: Path, *, as_json: bool, console: Any) -> int:
@@ -78,10 +78,8 @@ def _state(found: Inventory) -> str:
 
 def _outcome(found: Inventory) -> str:
     summary = found.summary
-    problem = summary.get("problem", CUT_SHORT)
-    if problem is not None:
-        return f"not completed: {problem}"
-    return "passed" if summary["passed"] else "failed"
+    scored = summary.get("heading_error_deg") is not None
+    return str(ending(summary.get("problem", CUT_SHORT), summary["passed"] if scored else None))
 
 
 def _size(size: float) -> str:

@@ -2,9 +2,10 @@
 
 import orjson
 import pytest
-from flights import SHORT, messages, recorded, told
+from flights import SHORT, fly_and_record, messages, recorded, told
 from mcap.writer import CompressionType, Writer
 
+from gcs.events import LAND
 from gcs.recording.tlog import packed
 
 
@@ -40,6 +41,14 @@ def test_a_flight_is_told_from_title_to_topics(gcs, flight):
     assert found["duration_s"] == pytest.approx(flight.summary.simulated_s, abs=0.2)
     assert found["versions"]["trustr"]
     assert found["bytes"] == flight.path.stat().st_size
+
+
+def test_a_mission_that_the_operator_broke_off_has_no_score_and_did_not_fail(gcs):
+    said = iter([(LAND,) if tick == 100 else () for tick in range(10_000)])
+    landed = fly_and_record("demo", *SHORT, events=lambda: next(said))
+    code, out, _ = gcs("log", "info", landed.path)
+    assert code == 0
+    assert "no score: it ended before its read-out" in " ".join(out.split())
 
 
 def test_topics_are_counted_to_the_message_and_the_byte(gcs, flight):

@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 from flights import SHORT, recorded
 
-from gcs.words import faults, verdict
+from gcs.scoring import score
+from gcs.words import ending, faults, measured, verdict
 from scenarios import load
 
 
@@ -57,3 +58,36 @@ def test_a_verdict_says_whom_the_swarm_went_on_without():
     assert "without" not in verdict(summary)
     assert ", without robot 5" in verdict(replace(summary, left_behind=[5]))
     assert ", without robots 2, 5" in verdict(replace(summary, left_behind=[2, 5]))
+
+
+@pytest.mark.parametrize(
+    ("problem", "passed", "words", "good"),
+    [
+        (None, True, "passed", True),
+        (None, False, "failed", False),
+        (None, None, "no score: it ended before its read-out", False),
+        ("vehicle 3 fell silent", True, "not completed: vehicle 3 fell silent", False),
+        ("vehicle 3 fell silent", None, "not completed: vehicle 3 fell silent", False),
+    ],
+)
+def test_a_flight_ends_in_one_of_four_ways(problem, passed, words, good):
+    ended = ending(problem, passed)
+    assert (str(ended), ended.good) == (words, good)
+
+
+def test_a_verdict_says_why_there_is_no_score_and_does_not_call_it_failed():
+    summary = replace(recorded("demo", *SHORT).summary, heading_error_deg=None, passed=False)
+    assert verdict(summary).splitlines()[1] == "no score: it ended before its read-out"
+    assert verdict(replace(summary, problem="the disk is full")).splitlines()[1] == "not completed: the disk is full"
+
+
+def test_what_a_flight_is_judged_by_stands_beside_what_was_allowed():
+    flight = recorded("demo", *SHORT)
+    result = score(flight.read().track, flight.scenario)
+    kept = replace(result, heading_error_deg=1.24, distance_to_target_m=0.5, min_separation_m=2.0)
+    assert list(measured(kept, flight.scenario)) == [
+        "heading off by 1.2° (allowed 4°)",
+        "0.5 m from the target (allowed 3.2 m)",
+    ]
+    close = list(measured(replace(kept, min_separation_m=0.444), flight.scenario))
+    assert close[2:] == ["robots as close as 0.44 m (allowed 1 m)"]
