@@ -5,12 +5,19 @@ from math import isnan
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import stats
 
 from gcs.statistics import PairedDifference, Share, Spread
 
 GAIN = (1.2, 2.4, 1.3, 1.3, 0.0, 1.0, 1.8, 0.8, 4.6, 1.4)
 """Hours of sleep, the second drug's minus the first's: Student (1908), Biometrika 6; its interval is R's `t.test`."""
+
+
+@pytest.fixture(scope="module")
+def stats():
+    """Imported where it is used: it takes a second, and every process that runs tests collects this file."""
+    from scipy import stats
+
+    return stats
 
 
 @pytest.mark.parametrize(
@@ -31,7 +38,7 @@ def test_wilsons_interval_of_all_is_the_mirror_of_none():
 
 
 @given(st.integers(1, 500).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
-def test_wilsons_interval_is_scipys_and_holds_its_rate(case):
+def test_wilsons_interval_is_scipys_and_holds_its_rate(stats, case):
     count, n = case
     share = Share.of(count, n)
     other = stats.binomtest(count, n).proportion_ci(method="wilson")
@@ -84,7 +91,7 @@ def test_the_paired_interval_turns_round_with_the_pair_and_does_not_see_where_bo
     assert (swapped.low, swapped.high) == (one.low, one.high)
 
 
-def test_the_paired_interval_holds_its_level_at_thirty_pairs():
+def test_the_paired_interval_holds_its_level_at_thirty_pairs(stats):
     """Exactly, by the multinomial's sum, where the two disagree in a tenth of the pairs and neither is better."""
     n, disagree = 30, 0.1
     covered = 0.0
@@ -102,7 +109,7 @@ def test_the_means_interval_is_students():
     assert (low, high) == pytest.approx((0.7001142, 2.4598858), abs=1e-6)
 
 
-def test_a_spread_knows_its_tail_and_one_value_has_no_interval():
+def test_a_spread_knows_its_tail_and_one_value_has_no_interval(stats):
     values = [1.0, 2.0, 4.0, 5.0]
     spread = Spread.of(values)
     low, high = stats.t.interval(0.95, 3, loc=3.0, scale=stats.sem(values))
