@@ -61,9 +61,10 @@ def flown(
     recording: Recording = AS_IN_RUN,
     reception: Callable[[], Reception] = Reception,
     faults_made: bool = True,
+    pictured: bool = True,
     say: Callable[[str], None] = console.say,
 ) -> Summary:
-    """Fly a scenario over a link; leaves run.mcap, summary.json and trajectory.png in `out`.
+    """Fly a scenario over a link; leaves run.mcap, summary.json and, if pictured, trajectory.png in `out`.
 
     name: how the summary calls the scenario;  watching: builds what shows the flight while it goes on;
     ratings: known beforehand, () where only live ones may come, None where nobody rates.
@@ -116,7 +117,7 @@ def flown(
         journal = None if recording.journal is None else recording.journal.problem
         others = (journal, *(record.problem for record in shielded))
         recorder.add_metadata(SUMMARY, {"json": _with_problem(summary, recorder.problem, *others).json().decode()})
-    return _written(_with_problem(summary, recorder.problem, *others), track, scenario, out)
+    return _written(_with_problem(summary, recorder.problem, *others), track if pictured else None, scenario, out)
 
 
 def _with_problem(summary: Summary, *problems: str | None) -> Summary:
@@ -126,7 +127,7 @@ def _with_problem(summary: Summary, *problems: str | None) -> Summary:
 
 
 def _written(summary: Summary, track: Track | None, scenario: Scenario, out: Path) -> Summary:
-    """Leaves the picture and summary.json; what keeps them from being written is a problem of the flight."""
+    """Leaves a picture of the track and summary.json; what keeps them from being written is a problem of the flight."""
     picture = out / PICTURE
     try:
         if track is not None:

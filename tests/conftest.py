@@ -1,5 +1,6 @@
 """How hard property tests try: TRUSTR_PROFILE=test (the same few examples every time) or soak (many, always new)."""
 
+import gc
 import os
 
 from hypothesis import HealthCheck, settings
@@ -13,6 +14,11 @@ settings.register_profile(
     "soak", max_examples=SOAK_EXAMPLES, deadline=None, print_blob=True, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile(os.environ.get("TRUSTR_PROFILE", "test"))
+
+
+def pytest_collection_finish():
+    """What was collected stays to the end: the garbage collector need not look at it again and again."""
+    gc.freeze()
 
 
 def pytest_sessionfinish(session):
