@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
 from gcs.choices import Choices
 from gcs.events import Event, Rating
-from gcs.recording.files import METADATA
-from gcs.recording.reader import RecordedTick, UnreadableRecording, instead_of_scenario, opened, ticks
+from gcs.recording.files import METADATA, further_parts
+from gcs.recording.reader import CUT_SHORT, UnreadableRecording, instead_of_scenario, opened, ticks
 from gcs.supervision import Supervision, takes_ratings
 from gcs.versions import others
 from scenarios import Scenario
@@ -52,20 +52,21 @@ def _once_more(
 ) -> ToFly:
     """Ratings that counted in the mission do so at the same time of the mission; all else comes at its tick."""
     with opened(path) as recording:
-        told = recording.metadata[METADATA]
+        told, problem = recording.metadata[METADATA], recording.problem
         scenario = choices.revised(recording.scenario, source=str(path))
-    pages = list(ticks(path))
+    said = [(page.number, page.events) for page in ticks(path)]
     seed = _seed(told, path, say) if seed is None else seed
-    _remark(told, pages, path, say)
+    for remark in _remarks(told, [number for number, _ in said], path, problem):
+        say(f"{path}: {remark}")
     ratings = supervision.known(scenario, seed=seed)
-    recorded = [event for page in pages for event in page.events if isinstance(event, Rating)]
+    recorded = [event for _, events in said for event in events if isinstance(event, Rating)]
     heard = told.get("ratings", "") != "" and supervision.ratings is None and takes_ratings(scenario)
     if heard:
         ratings = tuple(rating for rating in recorded if rating.time_s is not None)
     elif recorded:
         why = f"trust from {scenario.trust.source} takes none" if supervision.ratings is None else "others are given"
         say(f"the {len(recorded)} ratings of {path} are left out: {why}")
-    return ToFly(told.get("scenario") or path.stem, scenario, seed, ratings, _at_their_ticks(pages, rated=heard))
+    return ToFly(told.get("scenario") or path.stem, scenario, seed, ratings, _at_their_ticks(said, rated=heard))
 
 
 def _seed(told: Mapping[str, str], path: Path, say: Callable[[str], None]) -> int:
@@ -77,25 +78,29 @@ def _seed(told: Mapping[str, str], path: Path, say: Callable[[str], None]) -> in
     return FIRST_SEED
 
 
-def _remark(told: Mapping[str, str], pages: list[RecordedTick], path: Path, say: Callable[[str], None]) -> None:
-    """Why this flight may be another than the one that was recorded."""
+def _remarks(told: Mapping[str, str], numbers: Sequence[int], path: Path, problem: str | None) -> Iterator[str]:
+    """Why this flight may be another than the one that was recorded. numbers: of the ticks that are there."""
     elsewhere = ", ".join(others(told))
     if elsewhere:
-        say(f"{path}: was recorded with {elsewhere}; the bytes of this flight may differ")
-    if not pages:
+        yield f"was recorded with {elsewhere}; the bytes of this flight may differ"
+    if not numbers:
         raise UnreadableRecording(f"{path}: holds no tick of the flight")
-    lost = pages[-1].number + 1 - len(pages)
+    lost = numbers[-1] + 1 - len(numbers)
     if lost:
-        say(f"{path}: lacks {lost} of its ticks; what was said in them is not said again")
+        yield f"lacks {lost} of its ticks; what was said in them is not said again"
+    if parts := ", ".join(part.name for part in further_parts(path)):
+        yield f"goes on in {parts}, of which nothing is said again; gcs log recover {path} puts it together"
+    elif problem == CUT_SHORT:
+        yield "ends before the flight did; what was said after that is not said again"
 
 
-def _at_their_ticks(pages: Iterable[RecordedTick], *, rated: bool) -> Callable[[], tuple[Event, ...]]:
+def _at_their_ticks(
+    recorded: Iterable[tuple[int, tuple[Event, ...]]], *, rated: bool
+) -> Callable[[], tuple[Event, ...]]:
     """What was said, call by call: the operator's words, and if rated what people said outside the mission."""
     said = {
-        page.number: tuple(
-            event for event in page.events if not isinstance(event, Rating) or (rated and event.time_s is None)
-        )
-        for page in pages
+        number: tuple(event for event in events if not isinstance(event, Rating) or (rated and event.time_s is None))
+        for number, events in recorded
     }
     calls = count()
     return lambda: said.get(next(calls), ())

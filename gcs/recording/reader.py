@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +17,7 @@ from mcap.reader import NonSeekingReader, SeekingReader
 from pydantic import ValidationError
 
 from gcs.events import Event, Rating
+from gcs.gate import LOST_NS
 from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
 from gcs.mission import plan
 from gcs.recording.files import FAULTS, MADE, METADATA, SCENARIO, SUMMARY
@@ -192,9 +193,12 @@ def points(told: Mapping[str, Mapping[int, Mapping[str, Any]]]) -> Iterator[Poin
     places = telemetry if measured else pose
     for tick in sorted(mission.keys() & trust.keys() & places.keys()):
         position = np.array(places[tick]["position_m"], dtype=np.float64)
+        if measured:
+            position *= 1.0, 1.0, -1.0
+            position[np.array(places[tick]["age_s"], dtype=np.float64) > LOST_NS / 1e9] = np.nan
         yield Point(
             time_s=mission[tick]["mission_s"],
-            position=position * (1.0, 1.0, -1.0) if measured else position,
+            position=position,
             trust=np.array(trust[tick]["trust"]),
             virtual_ne=np.array([mission[tick]["north_m"], mission[tick]["east_m"]]),
             measured=measured,
@@ -218,20 +222,25 @@ SENT = f"/mavlink/{GROUND_SYSTEM}_{GROUND_COMPONENT}/raw"
 
 def ticks(path: Path) -> Iterator[RecordedTick]:
     """The frames of a recording as the loop took and sent them, in the file's order. Raises UnreadableRecording."""
-    framer, received, sent, said = Framer(), list[Frame](), list[bytes](), list[Rating]()
     with readable(path), path.open("rb") as stream:
-        for topic, encoding, time_ns, data in _messages(stream):
-            if topic == SENT:
-                sent.append(data)
-            elif encoding == "mavlink":
-                received += framer.frames(time_ns, data)
-            elif topic == "/ratings":
-                said.append(rating_of(orjson.loads(data)))
-            elif topic == "/tick":
-                content = orjson.loads(data)
-                whole = len(received) == content["frames"]
-                yield RecordedTick(content["number"], time_ns, received, sent, (*content["events"], *said), whole)
-                received, sent, said = [], [], []
+        yield from paged(_messages(stream))
+
+
+def paged(messages: Iterable[Message]) -> Iterator[RecordedTick]:
+    """The same of its messages; those behind the last tick are of none."""
+    framer, received, sent, said = Framer(), list[Frame](), list[bytes](), list[Rating]()
+    for topic, encoding, time_ns, data in messages:
+        if topic == SENT:
+            sent.append(data)
+        elif encoding == "mavlink":
+            received += framer.frames(time_ns, data)
+        elif topic == "/ratings":
+            said.append(rating_of(orjson.loads(data)))
+        elif topic == "/tick":
+            content = orjson.loads(data)
+            whole = len(received) == content["frames"]
+            yield RecordedTick(content["number"], time_ns, received, sent, (*content["events"], *said), whole)
+            received, sent, said = [], [], []
 
 
 FRESH_S = 0.3

@@ -6,18 +6,15 @@ import math
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from itertools import takewhile
-from pathlib import Path
-from typing import NamedTuple
 
 from gcs.choices import AS_IT_IS, BadUsageError, Choices
 from gcs.events import Event
 from gcs.flight import Flight
 from gcs.loop import Record, Tick, fly
-from gcs.recording.reader import SENT, Flown, RecordedTick, UnreadableRecording, located, opened, read, ticks
+from gcs.recording.reader import RecordedTick
+from gcs.replay.pages import Pages
 from scenarios import Scenario
 from wire.frames import Frame
-from wire.payloads import SET_POSITION_TARGET_LOCAL_NED, unpack_position_target
 
 
 class EndOfRecording(Exception):
@@ -62,40 +59,6 @@ class Recorded:
         return self._pages[self._page].events
 
 
-class Gap(NamedTuple):
-    """Ticks, both included, of which a damaged recording lost everything or some of the frames that they consumed."""
-
-    first: int
-    last: int
-
-
-@dataclass(frozen=True, slots=True)
-class Pages:
-    """A recording, as far as it can be decided again: to its first gap, for what follows depends on what is lost."""
-
-    told: Flown
-    ticks: Sequence[RecordedTick]
-    """Without any gap."""
-    beyond: Sequence[RecordedTick]
-    """Those behind the first gap."""
-    gaps: tuple[Gap, ...]
-    unfinished: int
-    """Frames that were sent in ticks of which the recording tells nothing: its process was killed before it could."""
-
-    @staticmethod
-    def of(path: Path) -> Pages:
-        """Of a recording, or the one in a run's folder. Raises UnreadableRecording."""
-        path = located(path)
-        told, pages = read(path), list(ticks(path))
-        if not pages:
-            raise UnreadableRecording(f"{path}: holds no tick to decide again")
-        with opened(path) as recording:
-            sent = sum(message.topic == SENT for message in recording.messages)
-        known = len(list(takewhile(lambda at: at[1].whole and at[1].number == at[0], enumerate(pages))))
-        unfinished = sent - sum(len(page.sent) for page in pages)
-        return Pages(told, pages[:known], pages[known:], _gaps(pages), unfinished)
-
-
 @dataclass(frozen=True, slots=True)
 class Again:
     """What deciding again came to, tick by tick."""
@@ -137,20 +100,6 @@ def chosen(pages: Pages, choices: Choices) -> Scenario | None:
     return scenario
 
 
-SETPOINT = SET_POSITION_TARGET_LOCAL_NED.to_bytes(3, "little")
-
-
-def is_setpoint(frame: bytes) -> bool:
-    """Whether a frame that we sent is a set-point."""
-    return frame[7:10] == SETPOINT
-
-
-def velocity_of(payload: bytes) -> tuple[float, float, float]:
-    """m/s: north, east, down of a set-point."""
-    target = unpack_position_target(payload)
-    return target.vx, target.vy, target.vz
-
-
 class _Notes:
     """A `Record` of what a decision says of itself."""
 
@@ -161,12 +110,3 @@ class _Notes:
     def tick(self, tick: Tick) -> None:
         self.mission_s.append(tick.diagnosis.mission_s)
         self.problem = tick.state.problem
-
-
-def _gaps(pages: Sequence[RecordedTick]) -> tuple[Gap, ...]:
-    """In the order of ticks; those that touch are one."""
-    there, end = {page.number for page in pages if page.whole}, pages[-1].number + 1
-    lacking = [number for number in range(end) if number not in there]
-    firsts = [number for number in lacking if number == 0 or number - 1 in there]
-    lasts = [number for number in lacking if number + 1 in there or number + 1 == end]
-    return tuple(map(Gap, firsts, lasts))

@@ -23,6 +23,7 @@ from gcs.flight import Flight
 from gcs.lockstep import Lockstep
 from gcs.loop import fly
 from gcs.mission import plan
+from gcs.recording.files import SUMMARY
 from gcs.recording.reader import Flown, read
 from gcs.session import AS_IN_RUN, flown
 from gcs.summary import Reception, Summary
@@ -185,6 +186,7 @@ def fly_and_record(
     autopilot="px4",
     recording=AS_IN_RUN,
     reception=Reception,
+    faults_made=True,
     pictured=False,
     say=lambda _words: None,
 ):
@@ -206,6 +208,7 @@ def fly_and_record(
         ratings=ratings,
         recording=recording,
         reception=reception,
+        faults_made=faults_made,
         pictured=pictured,
         say=say,
     )
@@ -259,11 +262,18 @@ def digest(path):
     return hashed.hexdigest()
 
 
-def rewritten(path, change=lambda _at, _topic, _time, data: data, *, scenario=lambda data: data):
+def unended(path):
+    """A copy of a recording whose flight nothing tells the end of."""
+    return rewritten(path, keep=lambda name: name != SUMMARY)
+
+
+def rewritten(
+    path, change=lambda _at, _topic, _time, data: data, *, scenario=lambda data: data, keep=lambda _name: True
+):
     """A copy of a recording, message by message.
 
     change: (place in the file, topic, log time, payload) → payload, or None to leave the message out;
-    scenario: changes the attachment.
+    scenario: changes the attachment;  keep: whether metadata of a name stays.
     """
     copy = scratch() / "rewritten.mcap"
     with path.open("rb") as stream, copy.open("wb") as target:
@@ -288,7 +298,7 @@ def rewritten(path, change=lambda _at, _topic, _time, data: data, *, scenario=la
                 scenario(attachment.data),
             )
         stream.seek(0)
-        for metadata in NonSeekingReader(stream).iter_metadata():
+        for metadata in filter(lambda record: keep(record.name), NonSeekingReader(stream).iter_metadata()):
             writer.add_metadata(metadata.name, metadata.metadata)
         writer.finish()
     return copy

@@ -1,16 +1,27 @@
 """A recorded flight decided again: the same to the bit, or the tick at which it is not."""
 
+import re
+import shutil
+
 import numpy as np
 import orjson
 import pytest
-from flights import SEEDS, SHORT, failing, fly_and_record, messages, recorded, rewritten, told
+from flights import SEEDS, SHORT, failing, fly_and_record, messages, recorded, rewritten, told, unended
 
 from gcs.recording.reader import SENT, UnreadableRecording, ticks
-from gcs.replay.again import Gap
+from gcs.replay.difference import Difference
+from gcs.replay.pages import LostTicks
 from gcs.replay.verify import decide_again
 from gcs.reproduce import conditions
 from wire.frames import Framer, Sender, target_system
-from wire.payloads import LOCAL_POSITION_NED, pack_local_position, unpack_local_position
+from wire.payloads import (
+    LOCAL_POSITION_NED,
+    SET_POSITION_TARGET_LOCAL_NED,
+    PositionTarget,
+    pack_local_position,
+    pack_position_target,
+    unpack_local_position,
+)
 
 PAPER = [condition for condition in conditions() if condition.severity is not None and condition.profile == "paper"]
 BRIEF = ("demo", *SHORT)
@@ -171,6 +182,30 @@ def test_what_no_decision_asks_for_may_change_without_a_difference(gcs):
     assert verified(gcs, recorded("emergency").path, *(f"--set={key}" for key in unasked))[0] == 0
 
 
+def test_a_difference_is_told_in_as_many_digits_as_show_it(gcs):
+    flight = recorded(*BRIEF)
+    _, words = verified(gcs, flight.path, "--set", "limits.speed_m_s=3")
+    was, would_be = re.search(r"was sent (.*) m/s, and would be sent (.*) m/s\n", words).groups()
+    assert was != would_be
+    _, words = verified(gcs, flight.path, "--set", "swarm.altitude_m=20")
+    assert re.search(r" on, \d+\.\d s before mission start: vehicle 1 ", words)
+
+
+@pytest.mark.parametrize("field", ["yaw", "type_mask"])
+def test_a_difference_that_is_not_in_the_velocity_is_named(field):
+    target = PositionTarget(7, *[0.0] * 11, type_mask=3527, target_system=1, target_component=1, coordinate_frame=1)
+    one, other = (
+        Sender(255, 190).frame(SET_POSITION_TARGET_LOCAL_NED, pack_position_target(sent))
+        for sent in (target, target._replace(**{field: 1}))
+    )
+    words = Difference.of(5, None, [one], [other]).words()
+    assert re.search(rf"vehicle 1 was sent {field}=[\d.]+, and would be sent {field}=1(\.0)?$", words)
+    later = Sender(255, 190)
+    later.frame(SET_POSITION_TARGET_LOCAL_NED, pack_position_target(target))
+    same = later.frame(SET_POSITION_TARGET_LOCAL_NED, pack_position_target(target))
+    assert "with the sequence number 0, and would" in Difference.of(5, None, [one], [same]).words()
+
+
 def test_a_scenario_that_was_tampered_with_in_the_recording_is_found_where_it_acts():
     flight = recorded(*BRIEF)
 
@@ -216,7 +251,7 @@ def test_it_is_verified_as_far_as_the_first_gap_and_no_further(gcs):
     torn = without(flight.path, lambda tick, _topic, _data: tick in (130, 131, 150))
     result = decide_again(torn)
     assert (result.ticks, result.difference) == (130, None)
-    assert result.gaps == (Gap(130, 131), Gap(150, 150))
+    assert result.gaps == (LostTicks(130, 131), LostTicks(150, 150))
     whole = decide_again(flight.path)
     assert whole.setpoints - result.setpoints - result.beyond == 3 * flight.scenario.swarm.count
     assert not result.identical
@@ -231,14 +266,14 @@ def test_one_lost_frame_of_what_a_tick_consumed_is_a_gap():
     flight = recorded(*BRIEF)
     place = telemetry(flight.path, 3, 140)
     result = decide_again(rewritten(flight.path, lambda at, _topic, _time, data: None if at == place else data))
-    assert (result.ticks, result.gaps, result.difference) == (140, (Gap(140, 140),), None)
+    assert (result.ticks, result.gaps, result.difference) == (140, (LostTicks(140, 140),), None)
 
 
 def test_of_a_recording_without_its_beginning_nothing_is_verified(gcs):
     flight = recorded(*BRIEF)
     headless = without(flight.path, lambda tick, _topic, _data: tick < 20)
     result = decide_again(headless)
-    assert (result.ticks, result.setpoints, result.gaps) == (0, 0, (Gap(0, 19),))
+    assert (result.ticks, result.setpoints, result.gaps) == (0, 0, (LostTicks(0, 19),))
     code, words = verified(gcs, headless)
     assert code == 3
     assert "identical" not in words
@@ -253,7 +288,32 @@ def test_frames_of_ticks_that_were_never_told_are_counted_and_not_verified(gcs):
     assert result.unfinished == sent - sum(len(page.sent) for page in ticks(killed)) > 0
     code, words = verified(gcs, killed)
     assert code == 3
-    assert f"not verified: {result.unfinished} frames at the end" in words
+    assert f"not verified: {result.unfinished} frames at the end: the recording ends in the middle of a tick" in words
+
+
+def test_a_recording_that_goes_on_in_another_file_is_not_verified(gcs, tmp_path):
+    for name in ("run.mcap", "run.part2.mcap", "run.part3.mcap"):
+        shutil.copy(recorded(*BRIEF).path, tmp_path / name)
+    code, words = verified(gcs, tmp_path)
+    assert code == 3
+    assert words.endswith(
+        "not verified: the recording goes on in run.part2.mcap, run.part3.mcap; "
+        f"gcs log recover {tmp_path / 'run.mcap'} puts it together\n"
+    )
+    code, out = verified(gcs, tmp_path, "--json")
+    assert (code, orjson.loads(out)["identical"]) == (3, False)
+    assert orjson.loads(out)["further_parts"] == ["run.part2.mcap", "run.part3.mcap"]
+
+
+def test_of_a_recording_that_ends_before_its_flight_all_that_is_there_is_identical_and_that_it_ends_is_said(gcs):
+    path = unended(recorded(*BRIEF).path)
+    code, words = verified(gcs, path)
+    assert code == 0
+    assert words.endswith("\nthe recording ends before the flight did: what was sent then is not in it\n")
+    code, out = verified(gcs, path, "--json")
+    told_of = orjson.loads(out)
+    assert (code, told_of["identical"], told_of["ends_before_flight"]) == (0, True, True)
+    assert orjson.loads(verified(gcs, recorded(*BRIEF).path, "--json")[1])["ends_before_flight"] is False
 
 
 def test_a_flight_cut_short_is_decided_again_as_far_as_it_went(tmp_path):

@@ -5,7 +5,7 @@ from functools import cache
 
 import orjson
 import pytest
-from flights import SHORT, digest, failing, fly_and_record, messages, recorded, rewritten, told
+from flights import SHORT, digest, failing, fly_and_record, messages, recorded, rewritten, told, unended
 
 from gcs.choices import Choices
 from gcs.events import Rating
@@ -147,6 +147,17 @@ def test_ticks_that_a_damaged_recording_lacks_are_said_to_be_silent():
 
     _, (said,) = prepared(rewritten(recorded(*BRIEF).path, without))
     assert said.endswith("lacks 1 of its ticks; what was said in them is not said again")
+
+
+def test_what_a_recording_does_not_hold_of_its_flight_is_said_not_to_be_said_again(tmp_path):
+    for name in ("run.mcap", "run.part2.mcap"):
+        shutil.copy(recorded(*BRIEF).path, tmp_path / name)
+    path = tmp_path / "run.mcap"
+    assert prepared(tmp_path)[1] == [
+        f"{path}: goes on in run.part2.mcap, of which nothing is said again; gcs log recover {path} puts it together"
+    ]
+    path = unended(recorded(*BRIEF).path)
+    assert prepared(path)[1] == [f"{path}: ends before the flight did; what was said after that is not said again"]
 
 
 # --- what cannot be flown
