@@ -64,6 +64,8 @@ def _found(flight: Flown, result: Score | None) -> str:
     """Who was rightly distrusted, how soon, and how many wrongly."""
     if result is None or trust_of(flight.scenario) is None:
         return "–"
+    if flight.track is None or not flight.track.faults_known:
+        return "no truth was told"
     found = [f"robot {system}: {seconds:.1f} s" for system, seconds in result.detected.items()]
     wrongly = [f"{result.false_alarms} wrongly"] if result.false_alarms else []
     return ", ".join(found + wrongly) or "nobody"

@@ -19,11 +19,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from gcs.mission import Plan, plan
-from gcs.scoring import DISTRUSTED, Score, score, scored_robots
+from gcs.scoring import DISTRUSTED, Score, score, scored_robots, struck
 from gcs.summary import trust_of
 from gcs.track import Parts, Track
 from gcs.words import controller_name, ending, faults, measured, robots
-from scenarios import Scenario, healthy_robots, offsets_ne
+from scenarios import Scenario, offsets_ne
 
 HEALTHY = ("#1f4e8c", "#2a7fba", "#3aa6a0", "#5b8def", "#6a7fb5", "#2c9c6a")
 FAILED = "#d62728"
@@ -49,6 +49,10 @@ class Panel:
     scenario: Scenario
     problem: str | None = None
     """Why the flight could not be completed."""
+
+    def failed(self, row: int) -> bool:
+        """Whether a fault of this robot's acted before the read-out, as far as is known."""
+        return row + 1 in struck(self.track, self.scenario)
 
 
 def draw(track: Track, scenario: Scenario, path: Path, *, problem: str | None = None) -> None:
@@ -93,7 +97,7 @@ def _window(panels: Sequence[Panel]) -> Window:
         for segment in plan(panel.scenario).segments:
             places += [segment.start_ne[None], segment.planned_end_ne[None]]
     every = np.concatenate(places)
-    (south, west), (north, east) = every.min(axis=0) - MARGIN, every.max(axis=0) + MARGIN
+    (south, west), (north, east) = np.nanmin(every, axis=0) - MARGIN, np.nanmax(every, axis=0) + MARGIN
     return (west, east), (south, north)
 
 
@@ -104,9 +108,9 @@ def _map(axes: Any, panel: Panel, window: Window) -> None:
     _draw_plan(axes, plan(scenario))
     parts = _parts(track, scenario)
     for row in range(scenario.swarm.count):
-        _draw_robot(axes, row, track, _colour(row, scenario), parts)
-    scored = scored_robots(scenario)
-    mean = (track.position[:, scored, :2] - offsets_ne(scenario)[scored]).mean(axis=1)
+        _draw_robot(axes, row, track, _colour(row, panel), parts)
+    scored = scored_robots(scenario, known=track.faults_known)
+    mean = _mean(track.position[:, scored, :2] - offsets_ne(scenario)[scored])
     axes.plot(mean[:, 1], mean[:, 0], color="black", lw=2.4, zorder=4)
     axes.plot(mean[-1, 1], mean[-1, 0], "D", color="black", ms=5, mec="white", zorder=7.5)
     wrong = wrap(" and ".join(faults(scenario)) or "nothing goes wrong", width=TITLE)
@@ -120,7 +124,10 @@ def _map(axes: Any, panel: Panel, window: Window) -> None:
 def _draw_robot(axes: Any, row: int, track: Track, colour: str, parts: tuple[Parts, ...]) -> None:
     """One robot's way: thin from where it was left behind, with a triangle at the end if it leads then."""
     north, east = track.position[:, row, 0], track.position[:, row, 1]
-    failed = colour == FAILED
+    heard = np.flatnonzero(np.isfinite(east))
+    if not heard.size:
+        return
+    last, failed = int(heard[-1]), colour == FAILED
     left = _left_behind(row, track, parts)
     for among, style in ((~left, "-"), (left, ":")):
         line = _where(among, east), _where(among, north)
@@ -129,10 +136,10 @@ def _draw_robot(axes: Any, row: int, track: Track, colour: str, parts: tuple[Par
         axes.plot(east[since], north[since], "o", color=colour, ms=9, mfc="none", mew=1.6, zorder=5)
     axes.plot(east[0], north[0], ".", color=colour, ms=5, zorder=3)
     end, size = ("X", 10) if failed else ("^", 8) if row + 1 in parts[-1].leaders else ("o", 6)
-    axes.plot(east[-1], north[-1], end, color=colour, ms=size, mec="white", zorder=7)
+    axes.plot(east[last], north[last], end, color=colour, ms=size, mec="white", zorder=7)
     axes.annotate(
         str(row + 1),
-        (east[-1], north[-1]),
+        (east[last], north[last]),
         xytext=(7, 3),
         textcoords="offset points",
         fontsize=9,
@@ -143,6 +150,13 @@ def _draw_robot(axes: Any, row: int, track: Track, colour: str, parts: tuple[Par
     )
 
 
+def _mean(place: Any) -> Any:
+    """(T, N, 2) → (T, 2): of those whose place is known; NaN where nobody's is."""
+    known = np.isfinite(place)
+    counted = known.sum(axis=1)
+    return np.where(counted, np.where(known, place, 0.0).sum(axis=1) / np.maximum(counted, 1), np.nan)
+
+
 def _where(among: Flags, values: Any) -> Any:
     """Values (T,) with their neighbours on either side, and NaN elsewhere, so that the pieces of a line meet."""
     beside = among.copy()
@@ -150,8 +164,8 @@ def _where(among: Flags, values: Any) -> Any:
     return np.where(beside, values, np.nan)
 
 
-def _colour(row: int, scenario: Scenario) -> str:
-    return HEALTHY[row % len(HEALTHY)] if healthy_robots(scenario)[row] else FAILED
+def _colour(row: int, panel: Panel) -> str:
+    return FAILED if panel.failed(row) else HEALTHY[row % len(HEALTHY)]
 
 
 def _parts(track: Track, scenario: Scenario) -> tuple[Parts, ...]:
@@ -220,7 +234,7 @@ def _trust(axes: Any, panel: Panel, *, first: bool) -> None:
     else:
         axes.axhline(DISTRUSTED, color=ABANDONED, lw=1, ls=":")
         for row in range(scenario.swarm.count):
-            colour = _colour(row, scenario)
+            colour = _colour(row, panel)
             axes.plot(track.time_s, track.trust[:, row], color=colour, lw=2.2 if colour == FAILED else 1.2)
     if path.hand_over_s > 0:
         _mark(axes, path.hand_over_s, 0.30, "emergency call" if scenario.event else "next leg", PLANNED)
@@ -238,7 +252,7 @@ def _trust(axes: Any, panel: Panel, *, first: bool) -> None:
 def _draw_faults(axes: Any, panel: Panel) -> None:
     """Bands while something goes wrong."""
     times = panel.track.time_s
-    for fault in panel.scenario.fault:
+    for fault in panel.scenario.fault if panel.track.faults_known else ():
         acts = np.array([fault.active(time_s) for time_s in times.tolist()])
         colour = AIR if fault.blamed is None else FAULT
         axes.fill_between(times, -0.08, 1.08, where=acts, step="post", color=colour, lw=0, zorder=0)
@@ -265,7 +279,7 @@ def _turns(parts: Sequence[Parts]) -> Iterator[tuple[float, float, str]]:
 
 
 def _legend(panels: Sequence[Panel]) -> list[Line2D | Patch]:
-    faulty = sorted({int(row) + 1 for panel in panels for row in np.flatnonzero(~healthy_robots(panel.scenario))})
+    faulty = sorted({system for panel in panels for system in struck(panel.track, panel.scenario)})
     left = any(part.left_behind for panel in panels for part in panel.track.parts)
     nobodys = any(fault.blamed is None for panel in panels for fault in panel.scenario.fault)
     handles: list[Line2D | Patch] = [

@@ -44,14 +44,21 @@ class Score:
 
 
 def score(track: Track, scenario: Scenario) -> Score | None:
-    """Judge a mission; None if it ended before its read-out."""
+    """Judge a mission; None if it ended before its read-out.
+
+    A robot that telemetry had lost at hand-over or read-out is in no mean; where it had lost all, there is no score.
+    """
     path = plan(scenario)
     if track.time_s[-1] < path.read_out_s - 1e-9:
         return None
     hand_over, read_out = (int(np.searchsorted(track.time_s, t - 1e-9)) for t in (path.hand_over_s, path.read_out_s))
     scored = scored_robots(scenario, known=track.faults_known)
-    struck = onsets(scenario, until_s=path.read_out_s) if track.faults_known else None
+    onset_s = onsets(scenario, until_s=path.read_out_s)
     place = track.position[..., :2] - offsets_ne(scenario)
+    heard = np.isfinite(place[[hand_over, read_out]]).all(axis=(0, 2))
+    scored &= heard
+    if not scored.any():
+        return None
     leg = path.segments[-1].velocity_ne
     error = abs(heading_error(place[hand_over, scored].mean(0), place[read_out, scored].mean(0), leg))
     distance = float(np.linalg.norm(place[read_out, scored].mean(0) - path.target_ne))
@@ -61,14 +68,16 @@ def score(track: Track, scenario: Scenario) -> Score | None:
         heading_error_deg=error,
         distance_to_target_m=distance,
         min_separation_m=separation,
-        swarm_heading_error_deg=abs(heading_error(place[hand_over].mean(0), place[read_out].mean(0), leg)),
+        swarm_heading_error_deg=abs(
+            heading_error(place[hand_over, heard].mean(0), place[read_out, heard].mean(0), leg)
+        ),
         passed=bool(
             error <= expect.heading_error_deg
             and distance <= expect.distance_to_target_m
             and separation >= expect.min_separation_m
         ),
-        detected={} if struck is None else _detected(track, struck),
-        false_alarms=0 if struck is None else _false_alarms(track, struck),
+        detected=_detected(track, onset_s) if track.faults_known else {},
+        false_alarms=_false_alarms(track, onset_s) if track.faults_known else 0,
     )
 
 
@@ -82,6 +91,11 @@ def onsets(scenario: Scenario, *, until_s: float = math.inf) -> dict[int, float]
         if fault.blamed is not None and fault.onset_s < until_s - 1e-9:
             first_s[fault.blamed] = min(first_s.get(fault.blamed, math.inf), fault.onset_s)
     return first_s
+
+
+def struck(track: Track, scenario: Scenario) -> dict[int, float]:
+    """The same of a mission as far as it was flown, to its read-out at most; nobody where nobody knows."""
+    return onsets(scenario, until_s=float(track.time_s[-1])) if track.faults_known else {}
 
 
 def scored_robots(scenario: Scenario, *, known: bool = True) -> npt.NDArray[np.bool_]:
@@ -110,13 +124,16 @@ def heading_error(start_ne: Array, end_ne: Array, wanted_ne: Array) -> float:
 
 
 def min_separation(position: Array) -> float:
-    """Smallest 3-D distance [m] of any two airborne robots over (T, N, 3) positions; infinite where there are none."""
+    """Smallest 3-D distance [m] of any two airborne robots over (T, N, 3) positions; infinite where there are none.
+
+    A robot whose place is not known, NaN, is none.
+    """
     return float(separation(position).min())
 
 
 def separation(position: Array) -> Array:
     """(T,) m between the closest two airborne robots of (T, N, 3) positions; infinite where there are none."""
-    grounded = position[..., 2] < AIRBORNE
+    grounded = ~(position[..., 2] >= AIRBORNE)  # or not known
     closest = np.full(len(position), np.inf)
     for first in range(position.shape[1] - 1):
         gap = np.linalg.norm(position[:, first + 1 :] - position[:, first, None], axis=-1)

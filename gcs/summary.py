@@ -66,7 +66,7 @@ class Summary:
     scored_on: str
     """"truth", or "telemetry" where no simulation told it."""
     faults: list[str]
-    """What went wrong with whom, in words."""
+    """What the scenario has go wrong with whom, in words."""
     swarm_heading_error_deg: float | None
     """As heading_error_deg, of all robots."""
     rejected_frames: int

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gcs.flight import Flight
+from gcs.gate import LOST_NS
 from gcs.loop import Tick
 from gcs.truth import Truth
 
@@ -22,7 +23,7 @@ class Track:
     time_s: Array
     """(T,) since mission start."""
     position: Array
-    """(T, N, 3) m: north, east of the swarm's origin, height above home."""
+    """(T, N, 3) m: north, east of the swarm's origin, height above home; NaN of a vehicle that telemetry has lost."""
     trust: Array
     """(T, N) in [0, 1]."""
     virtual_ne: Array
@@ -118,6 +119,7 @@ def point_of(tick: Tick, truth: Truth) -> Point | None:
         position = truth.position(frame, tick.swarm)
     else:
         position = np.column_stack([diagnosis.position_ne, -tick.swarm.position_ned[:, 2]])
+        position[tick.time_ns - tick.swarm.position_ns > LOST_NS] = np.nan  # where it was, and nobody knows where it is
     return Point(
         diagnosis.mission_s,
         position,

@@ -35,7 +35,7 @@ from gcs.recording.reader import (
     track_of,
 )
 from gcs.recording.recovery import RECOVERED
-from gcs.scoring import onsets
+from gcs.scoring import struck
 from gcs.track import Parts, Track
 from scenarios import Scenario
 
@@ -142,19 +142,16 @@ class History:
     @property
     def acted(self) -> tuple[FaultSpan, ...]:
         """The faults that began before the mission was read out, or came to its end: those it can be told of."""
-        return tuple(span for span in self.faults if span.from_s < self._until_s - 1e-9)
+        until_s = -math.inf if self.track is None else float(self.track.time_s[-1])
+        return tuple(span for span in self.faults if span.from_s < until_s - 1e-9)
 
     @property
     def onsets(self) -> dict[int, float]:
         """System id → seconds since mission start at which the first fault blamed on it began, of those that `acted`.
 
-        Whoever is not in it was healthy, as far as is known: scores are by the same (gcs.scoring.onsets).
+        Whoever is not in it was healthy, as far as is known: scores count from the same onsets.
         """
-        return {} if self.faults_by == "unknown" else onsets(self.scenario, until_s=self._until_s)
-
-    @property
-    def _until_s(self) -> float:
-        return -math.inf if self.track is None else float(self.track.time_s[-1])
+        return {} if self.track is None else struck(self.track, self.scenario)
 
 
 def load(path: Path) -> History:

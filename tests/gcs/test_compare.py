@@ -4,6 +4,7 @@ from dataclasses import replace
 from io import StringIO
 
 import matplotlib.image as mpimg
+import numpy as np
 import pytest
 from flights import SHORT, fly_and_record, recorded
 from rich.console import Console
@@ -122,6 +123,17 @@ def test_the_picture_tells_two_faulty_robots_left_behind_from_the_others(tmp_pat
     legend, legend_untold = image[-100:], untold[-100:]
     assert shade(legend, FAILED) > shade(legend_untold, FAILED) > 50
     assert shade(image, FAULT) > 5000
+
+
+def test_a_robot_that_telemetry_has_lost_is_drawn_as_far_as_it_was_heard(tmp_path):
+    flight = recorded("demo", *SHORT).read()
+    position = flight.track.position.copy()
+    position[20:, 1], position[:, 2] = np.nan, np.nan
+    draw(replace(flight.track, position=position, measured=True), flight.scenario, tmp_path / "lost.png")
+    shown = pixels(tmp_path / "lost.png")
+    for row, there in ((0, True), (1, True), (2, False)):
+        colour = [int(HEALTHY[row][at : at + 2], 16) / 255 for at in (1, 3, 5)]
+        assert (np.abs(shown[: len(shown) // 2, :, :3] - colour) < 0.01).all(axis=2).any() == there
 
 
 def test_a_wind_on_everyone_shades_its_time_and_blames_nobody(tmp_path):

@@ -2,20 +2,24 @@
 
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 import orjson
 import pytest
-from flights import SHORT, Severed, failing, fly_and_record, recorded, rewritten, told
+from flights import SHORT, Beside, Severed, failing, fly_and_record, recorded, rewritten, told
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from gcs.events import LAND, Rating
+from gcs.mission import plan
 from gcs.recording.happenings import FaultSpan, distrust, phases, row_at, silences
 from gcs.recording.history import Kind, load
 from gcs.recording.reader import CUT_SHORT, UnreadableRecording, read
 from gcs.scoring import score
+from scenarios import load as load_scenario
+from wire.ids import TRUTH
 
 EMERGENCY = "emergency"
 
@@ -124,7 +128,8 @@ def eventful():
     ratings = tuple(Rating(f"op{number}", 5, 1, 0.4 + number / 10) for number in range(1, 4))
     said = iter([(LAND,) if tick == 165 else () for tick in range(10_000)])
     keys = ('trust.source="ratings"', 'fault=[{vehicle=2, kind="motor_degradation", onset_s=1, end_s=2.5}]')
-    return fly_and_record("demo", *SHORT, *keys, through=severed, ratings=ratings, events=lambda: next(said))
+    how = {"through": severed, "ratings": ratings, "events": lambda: next(said), "faults_made": False}
+    return fly_and_record("demo", *SHORT, *keys, **how)
 
 
 @pytest.fixture(scope="module")
@@ -135,6 +140,65 @@ def much(eventful):
 def test_a_fault_that_ends_has_an_end(much):
     assert [(span.vehicle, span.from_s, span.to_s) for span in much.faults] == [(2, 1.0, 2.5)]
     assert [text.split(":")[0] for _, text in words(much, Kind.FAULT)] == ["a fault begins", "a fault ends"]
+
+
+class Untold(Beside):
+    """A link to vehicles that do not tell where they really are, as real ones do not."""
+
+    def receive(self):
+        return [frame for frame in super().receive() if frame.component != TRUTH]
+
+
+def untold(link, world):
+    """The same, and robot 4 is not heard from the middle of the mission on."""
+    return Untold(Severed(link, world, system=4, from_s=13.0))
+
+
+DRAGS = ("trust.source=auto", 'fault=[{vehicle=5, kind="motor_degradation", onset_s=1}]')
+
+
+@pytest.fixture(scope="module")
+def blind():
+    return fly_and_record("demo", *SHORT, *DRAGS, through=untold, faults_made=False)
+
+
+def test_where_no_vehicle_tells_its_truth_nobody_knows_what_was_wrong(blind):
+    history = load(blind.path)
+    assert history.faults_by == "unknown"
+    assert (history.faults, history.acted, history.onsets) == ((), (), {})
+    assert told(blind, "/truth/fault") == []
+    assert (blind.summary.detected, blind.summary.false_alarms) == ({}, 0)
+
+
+def test_a_fault_that_we_make_ourselves_is_known_whatever_the_vehicles_tell():
+    history = load(fly_and_record("demo", *SHORT, *DRAGS, through=untold).path)
+    assert (history.measured, history.faults_by) == (True, "made")
+    assert history.onsets == {5: 1.0}
+    assert [span.words for span in history.acted] == ["robot 5 at 40% speed (from 1 s on)"]
+
+
+def test_a_simulation_behind_a_link_is_taken_to_fly_the_same_scenario(much):
+    assert (much.measured, much.faults_by, much.onsets) == (False, "planned", {2: 1.0})
+
+
+def test_a_fault_that_begins_after_the_read_out_never_acted(history):
+    read_out_s = plan(history.scenario).read_out_s
+    late = FaultSpan(2, "frozen_telemetry", read_out_s + 0.05, math.inf, "telemetry of robot 2 frozen")
+    assert replace(history, faults=(*history.faults, late)).acted == history.faults
+    assert history.onsets == {5: 0.0}
+    scenario = load_scenario(EMERGENCY, overrides=[f"fault.0.onset_s={late.from_s}"])
+    assert replace(history, scenario=scenario).onsets == {}
+
+
+def test_where_telemetry_is_all_there_is_a_silent_robot_is_nowhere(blind):
+    history = load(blind.path)
+    silent = history.age_s[np.isfinite(history.mission_s)][: len(history.track.time_s)] > 1.0
+    assert silent[:, 3].any()
+    assert not silent[0].any()
+    assert np.array_equal(np.isnan(history.track.position).any(axis=2), silent)
+    result = score(history.track, history.scenario)
+    assert result == score(read(blind.path).track, history.scenario)
+    assert result.swarm_heading_error_deg == blind.summary.swarm_heading_error_deg
 
 
 def test_distrust_is_found_at_the_tick_at_which_trust_was_below_one_half(eventful, much):

@@ -118,6 +118,36 @@ def test_two_robots_that_come_too_close_for_a_tick_fail_the_flight(gap, passes):
     assert result.passed is passes
 
 
+def lost(track, robots, since_s, until_s=inf):
+    """As telemetry has it, which tells nothing of these robots for a while."""
+    position = track.position.copy()
+    position[np.ix_((track.time_s >= since_s - 1e-9) & (track.time_s < until_s - 1e-9), robots)] = np.nan
+    return replace(track, position=position, measured=True)
+
+
+def test_a_robot_that_is_not_heard_is_close_to_nobody_and_in_no_mean():
+    astray = lost(moved(ideal(TRANSIT), (0.0, 50.0), robots=1), [1], 20.0)
+    close = lost(
+        moved(ideal(TRANSIT), ideal(TRANSIT).position[0, 0, :2] - (0.0, 0.1), robots=1, since_s=20.0), [1], 20.0
+    )
+    for track in (astray, close):
+        result = score(track, TRANSIT)
+        assert result.heading_error_deg == pytest.approx(0, abs=1e-9)
+        assert result.distance_to_target_m == pytest.approx(0, abs=1e-9)
+        assert result.swarm_heading_error_deg == pytest.approx(0, abs=1e-9)
+        assert result.min_separation_m == pytest.approx(3.0)
+
+
+def test_who_was_not_heard_only_between_hand_over_and_read_out_counts():
+    track = moved(ideal(TRANSIT), (0.0, 50.0), robots=1)
+    assert score(lost(track, [1], 10.0, 20.0), TRANSIT) == score(track, TRANSIT)
+
+
+def test_where_nobody_that_counts_is_heard_at_the_read_out_there_is_no_score():
+    assert score(lost(ideal(TRANSIT), [0, 1, 2, 3, 5], 27.0), TRANSIT) is None
+    assert score(lost(ideal(TRANSIT), [0, 1, 2, 3], 27.0), TRANSIT) is not None
+
+
 # --- trust
 
 
