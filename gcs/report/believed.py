@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from gcs.events import Rating
-from gcs.recording import sentences
 from gcs.report.axes import STRIP, Frame, framed
+from gcs.report.distrust import Distrust, distrusts
 from gcs.report.judged import marks, mission_frame
-from gcs.report.robots import Drawn, Section, key, names, swarm
+from gcs.report.rated import few, rating_key, ratings
+from gcs.report.robots import Drawn, Section, judged, key, names, swarm
 from gcs.report.series import heeded
 from gcs.report.svg import TEXT, element, hover, words
+from gcs.report.telling import capital, some
 from gcs.report.told import Told
 from gcs.scoring import DISTRUSTED
-from gcs.words import robots
 
 Array = npt.NDArray[np.float64]
 
 MOST_STRIPS = 6
 """Of faults, under a plot; more are drawn in the last."""
-MOST_FIGURES = 24
-"""Ratings up to which each shows its value."""
 EVERYONE = "all"
 
 
@@ -33,11 +32,23 @@ def trust(flights: Sequence[Told]) -> Section:
     return Section(
         "trust",
         "Trust",
-        "A line falls below the dashed one when its robot is distrusted. The bars under the plot are the truth, which "
-        "nobody in the air knew: while a fault acts on the robot of that number. Trust is right where a line is low "
-        "above its robot's bar, and nowhere else.",
-        (*key(flights), ("limit", "distrusted below"), *_truth_key(flights), *_rating_key(flights)),
+        f"A line falls below the dashed one when its robot is distrusted.{_of_bars(flights)}",
+        (*key(flights), ("limit", "distrusted below"), *_truth_key(flights), *rating_key(flights)),
         tuple(_trust(told, flights, strips) for told in flights),
+    )
+
+
+def _of_bars(flights: Sequence[Told]) -> str:
+    """What the bars under the plot are, where there are any."""
+    if not any(told.history.acted for told in flights):
+        return ""
+    planned = " as the scenario has it" if any(told.history.faults_by == "planned" for told in flights) else ""
+    knew = "which nobody in the air knew"
+    if any(told.trust_source == "truth" for told in flights):
+        knew = "which trust from truth is told, and nobody else in the air knew"
+    return (
+        f" The bars under the plot are the truth{planned}, {knew}: while a fault acts on the robot of that number. "
+        "Trust is right where a line is low above its robot's bar, and nowhere else."
     )
 
 
@@ -48,8 +59,8 @@ def weights(flights: Sequence[Told]) -> Section:
     return Section(
         "weights",
         "Who is heeded",
-        "The mean weight that healthy robots give to each robot as they choose their velocity. Averaged control heeds "
-        "all alike; a controller that protects the swarm takes the failed robot's line to the bottom.",
+        f"The mean weight that {judged(flights)} give to each robot as they choose their velocity. Averaged control "
+        "heeds all alike; a controller that protects the swarm takes the failed robot's line to the bottom.",
         (*key(flights), ("limit", "an equal share")),
         tuple(_weights(told, flights, share, top) for told, share in zip(flights, shares, strict=True)),
     )
@@ -66,7 +77,8 @@ def _trust(told: Told, flights: Sequence[Told], strips: int) -> Drawn:
         value = told.history.trust[told.mission]
         y = float(frame.value(DISTRUSTED))
         parts.append(element("line", x1=frame.time.start, x2=frame.time.end, y1=y, y2=y, class_="limit"))
-        parts += [*swarm(frame, told, told.mission, value), *_ratings(told, frame)]
+        lines = swarm(frame, told, told.mission, value)
+        parts += [*lines, *ratings(told, frame)] if few(told) else [*ratings(told, frame), *lines]
         beside = names(frame, told, value)
     else:
         middle = (frame.time.start + frame.time.end) / 2, (frame.value.start + frame.value.end) / 2
@@ -88,20 +100,32 @@ def _trust_in_words(told: Told) -> str:
     if not told.mission.size:
         return "The mission never began."
     if told.trust_source is None:
-        return "This rule asks for no trust: it heeds the failed like the healthy."
-    doubted = [system for system, look in zip(told.history.ids, told.looks, strict=True) if look == "doubted"]
-    found = {} if told.score is None else told.score.detected
-    said = [f"Robot {system} was distrusted {after_s:.1f} s after its fault began" for system, after_s in found.items()]
-    if doubted:
-        said.append(f"{robots(doubted)} without a fault")
-    elif found:
-        said.append("nobody without a fault")
-    return f"{'; '.join(said)}." if said else "Nobody was distrusted."
+        return "This rule asks for no trust."
+    about = distrusts(told)
+    if not told.faults_known:
+        fell = [f"in robot {one.system} at {one.wrongly_s:.1f} s" for one in about]
+        what = f"Trust fell below one half {some(fell)}" if fell else "Nobody was distrusted"
+        return f"{what}; whether anything was wrong, nobody told."
+    found, wronged = [one for one in about if one.found], [one for one in about if one.wronged]
+    said = [f"robot {one.system} was distrusted {one.delay_s:.1f} s after its fault began" for one in found]
+    said += [f"robot {one.system} failed and was trusted" for one in about if one.missed]
+    said += [f"robot {one.system} was distrusted at {one.wrongly_s:.1f} s {_without(one)}" for one in wronged]
+    if not wronged:
+        said.append("nobody was without a fault" if found else "nobody was distrusted")
+    return capital(f"{some(said, most=MOST_SAID, between='; ')}.")
+
+
+MOST_SAID = 6
+"""Robots that a caption tells of."""
+
+
+def _without(one: Distrust) -> str:
+    return "before it had a fault" if math.isfinite(one.onset_s) else "without a fault"
 
 
 def _struck(told: Told) -> list[int | None]:
     """Whom faults struck, in the order in which they are drawn; None is everyone."""
-    return sorted({span.vehicle for span in told.history.faults}, key=lambda system: (system is None, system))
+    return sorted({span.vehicle for span in told.history.acted}, key=lambda system: (system is None, system))
 
 
 def _strips(told: Told, frame: Frame) -> list[str]:
@@ -115,7 +139,7 @@ def _strips(told: Told, frame: Frame) -> list[str]:
             more = strip == MOST_STRIPS - 1 and len(struck) > MOST_STRIPS
             name = f"+{len(struck) - strip}" if more else EVERYONE if system is None else str(system)
             parts.append(words(frame.time.start - 5, y + 0.75 * TEXT, name, "tick y failed", anchor="end"))
-        for span in told.history.faults:
+        for span in told.history.acted:
             if span.vehicle == system:
                 begin, end = (float(frame.time.within(min(at, ends_s))) for at in (span.from_s, span.to_s))
                 class_ = "air bar" if system is None else "fault bar"
@@ -133,39 +157,12 @@ def _strips(told: Told, frame: Frame) -> list[str]:
     return parts
 
 
-def _ratings(told: Told, frame: Frame) -> list[str]:
-    """What people said, at 0 for 1 of 5 to 1 for 5 of 5: round of a robot, square of the swarm."""
-    said = [rating for rating in told.history.ratings if rating.time_s is not None]
-    figures = len(said) <= MOST_FIGURES
-    return [
-        _rating(told, frame, rating, rating.time_s, figures=figures) for rating in said if rating.time_s is not None
-    ]
-
-
-def _rating(told: Told, frame: Frame, rating: Rating, time_s: float, *, figures: bool) -> str:
-    x, y = float(frame.time.within(time_s)), float(frame.value((rating.rating - 1) / 4))
-    size = 7.0 if figures else 3.0
-    if rating.vehicle is None:
-        mark = element("rect", x=x - size, y=y - size, width=2 * size, height=2 * size, class_="rating swarm")
-    else:
-        look = told.looks[told.history.ids.index(rating.vehicle)]
-        mark = element("circle", cx=x, cy=y, r=size, class_=f"rating {look}")
-    value = words(x, y + 0.35 * TEXT, str(rating.rating), "value", anchor="middle") if figures else ""
-    return element("g", hover(sentences.rating(rating)) + mark + value)
-
-
 def _truth_key(flights: Sequence[Told]) -> Iterator[tuple[str, str]]:
-    struck = {span.vehicle for told in flights for span in told.history.faults}
+    struck = {span.vehicle for told in flights for span in told.history.acted}
     if struck - {None}:
         yield "fault bar", "truth: a fault acts"
     if None in struck:
         yield "air bar", "truth: it blows on everyone"
-
-
-def _rating_key(flights: Sequence[Told]) -> tuple[tuple[str, str], ...]:
-    if not any(told.history.ratings for told in flights):
-        return ()
-    return (("rating healthy", "a person's rating, 1 to 5, of a robot"), ("rating swarm", "of the swarm"))
 
 
 def _weights(told: Told, flights: Sequence[Told], share: Array, top: float) -> Drawn:

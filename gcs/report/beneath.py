@@ -14,6 +14,7 @@ from gcs.report.axes import STRIP, Frame, framed
 from gcs.report.robots import Drawn, Section, key, line, swarm
 from gcs.report.series import lost_share
 from gcs.report.svg import TEXT, Label, element, hover, path, words
+from gcs.report.telling import capital, some
 from gcs.report.told import Told
 from gcs.words import robots
 
@@ -119,7 +120,7 @@ def _links(told: Told, flights: Sequence[Told], top: float, oldest: float) -> Dr
             parts.append(
                 path(at, frame.value(share * top), "loss", "frames lost of the worst heard, full height is all")
             )
-    said = f"{_lost_in_words(told)} Telemetry was never older than {oldest:.2f} s."
+    said = f"{_lost_in_words(told)} {_age_in_words(told)}"
     svg = framed(frame, parts, title="Links", description=said, unit="seconds", marks=_marks(told))
     return Drawn(svg, said)
 
@@ -139,6 +140,22 @@ def _lost_in_words(told: Told) -> str:
     return (
         f"Frames were lost of {len(missing)} of {told.count} robots, of robot {worst} the most: {missing[worst]:.1%}."
     )
+
+
+def _age_in_words(told: Told) -> str:
+    """Who fell silent, and how old telemetry of the others grew."""
+    ever = told.silent.any(axis=0)
+    if not ever.any():
+        return f"Telemetry was never older than {float(np.nanmax(told.history.age_s, initial=0.0)):.2f} s."
+    ids, age_s = told.history.ids, told.history.age_s
+    lost = [
+        f"robot {ids[row]} was not heard for {float(np.nanmax(age_s[:, row])):.1f} s"
+        + (", to the end" if told.silent[-1, row] else "")
+        for row in np.flatnonzero(ever)
+    ]
+    heard = age_s[:, ~ever]
+    others = f"; telemetry of the others was never older than {float(np.nanmax(heard)):.2f} s" if heard.size else ""
+    return capital(f"{some(lost, between='; ')}{others}.")
 
 
 def _battery(told: Told, flights: Sequence[Told]) -> Drawn:

@@ -8,9 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from gcs.report.axes import WIDTH, Scale, figure, round_values, svg
-from gcs.report.robots import Drawn, Section, key
-from gcs.report.svg import LETTER, TEXT, element, hover, path, words
-from gcs.report.told import Told
+from gcs.report.placing import Box, Room, about, around
+from gcs.report.robots import Drawn, Section, key, mean_key
+from gcs.report.svg import TEXT, element, hover, path, words
+from gcs.report.told import Rows, Told
 from gcs.words import robots
 from scenarios import offsets_ne
 
@@ -42,6 +43,21 @@ class Ground:
     def at(self, place_ne: Array) -> tuple[float, float]:
         """Across and down of one place."""
         return float(self.east(place_ne[1])), float(self.north(place_ne[0]))
+
+    @property
+    def box(self) -> Box:
+        """Left, top, right and bottom."""
+        return self.east.start + 2.0, self.north.end, self.east.end, self.north.start
+
+    def round_(self, places_ne: Array) -> Box | None:
+        """The box round marks at places (N, 2); None of none that are known."""
+        known = places_ne[np.isfinite(places_ne).all(axis=1)]
+        if not known.size:
+            return None
+        (left, bottom), (right, top) = (
+            (float(self.east(east)), float(self.north(north))) for north, east in (known.min(axis=0), known.max(axis=0))
+        )
+        return left - 6.0, top - 6.0, right + 6.0, bottom + 6.0
 
     def way(self, places_ne: Array, class_: str, title: str = "") -> str:
         """A line through places (T, 2)."""
@@ -76,7 +92,7 @@ def courses(flights: Sequence[Told]) -> Section:
     return Section(
         "map",
         "Where they went",
-        "The thick line is the mean of the healthy robots, formation taken off: it should lie on the dashed plan and "
+        f"The thick line is the {mean_key(flights)[1]}, formation taken off: it should lie on the dashed plan and "
         "end at the last star. Robots are drawn where they were as results were read: leaders as triangles, failed "
         "ones as crosses, those left behind hollow.",
         (
@@ -86,7 +102,7 @@ def courses(flights: Sequence[Told]) -> Section:
                 if any(told.history.scenario.event for told in flights)
                 else ()
             ),
-            ("mean", "mean of the healthy robots"),
+            mean_key(flights),
             ("virtual", "virtual leader"),
             *key(flights),
         ),
@@ -109,45 +125,44 @@ def _ground(flights: Sequence[Told]) -> Ground:
 
 def _course(told: Told, ground: Ground) -> Drawn:
     rows = told.mission if told.mission.size else told.all_rows
-    position = told.history.position[rows, :, :2]
+    position = told.position[rows, :, :2]
     known = position[np.isfinite(position).all(axis=-1)]
-    parts = [
-        *ground.grid(),
-        *_plan(told, ground, np.column_stack([ground.east(known[:, 1]), ground.north(known[:, 0])])),
-    ]
-    if known.size:
-        parts += _ways(told, ground, position)
+    room = Room(ground.box, np.column_stack([ground.east(known[:, 1]), ground.north(known[:, 0])]))
+    plan = _plan(told, ground, room)
+    ways = _ways(told, ground, room, rows) if known.size else []
     said = _in_words(told)
+    parts = [*ground.grid(), *plan, *ways, *_tasks(told, ground, room)]
     return Drawn(svg(parts, ground.height, title="Map", description=said), said)
 
 
-def _ways(told: Told, ground: Ground, position: Array) -> list[str]:
+def _ways(told: Told, ground: Ground, room: Room, rows: Rows) -> list[str]:
     """Lines of robots, of what led them and of their mean; where they were last on top."""
     order = sorted(range(told.count), key=lambda row: ("healthy", "doubted", "failed").index(told.looks[row]))
     crowd = " crowd" if told.crowded else ""
     parts = [
-        ground.way(position[:, row], f"robot {told.looks[row]}{crowd}", f"robot {told.history.ids[row]}")
+        ground.way(told.position[rows, row, :2], f"robot {told.looks[row]}{crowd}", robots([told.history.ids[row]]))
         for row in order
     ]
     end = []
     if told.mission.size:
-        place = position - offsets_ne(told.history.scenario)
+        place = told.position[rows, :, :2] - offsets_ne(told.history.scenario)
         mean = place[:, told.scored].mean(axis=1)
-        parts.append(ground.way(told.history.virtual_ne[told.mission], "virtual", "virtual leader"))
-        parts.append(ground.way(mean, "mean", "mean of the healthy robots"))
-        x, y = ground.at(mean[-1])
-        end = [
-            element(
-                "path", hover("mean of the healthy robots"), d=f"M{x:.1f},{y - 5:.1f}l5,5l-5,5l-5,-5Z", class_="end"
-            )
-        ]
-    seen = [row for row in order if np.isfinite(position[-1, row]).all()]
-    marks = [_robot(told, ground, row, position[-1, row]) for row in seen]
-    return [*parts, *end, *_numbers(told, ground, position[-1], seen), *marks]
+        parts.append(ground.way(told.history.virtual_ne[rows], "virtual", "virtual leader"))
+        parts.append(ground.way(mean, "mean", told.mean))
+        if np.isfinite(mean[-1]).all():
+            x, y = ground.at(mean[-1])
+            end = [element("path", hover(told.mean), d=f"M{x:.1f},{y - 5:.1f}l5,5l-5,5l-5,-5Z", class_="end")]
+    last = told.history.position[rows[-1], :, :2]
+    seen = [row for row in order if np.isfinite(last[row]).all()]
+    for row in seen:
+        x, y = ground.at(last[row])
+        room.take((x - 5.0, y - 6.0, x + 5.0, y + 5.0))
+    marks = [_robot(told, ground, row, last[row], silent=bool(told.silent[rows[-1], row])) for row in seen]
+    return [*parts, *end, *_numbers(told, ground, room, last, seen), *marks]
 
 
-def _robot(told: Told, ground: Ground, row: int, place: Array) -> str:
-    """Where one robot was last, by its part: a cross has failed, a triangle leads; hollow if it was left behind."""
+def _robot(told: Told, ground: Ground, row: int, place: Array, *, silent: bool) -> str:
+    """Where one robot was last known, by its part: a cross has failed, a triangle leads; hollow if left behind."""
     x, y = ground.at(place)
     system, look, parts = told.history.ids[row], told.looks[row], told.parts_at_the_end()
     leads, left = system in parts.leaders, system in parts.left_behind
@@ -158,40 +173,36 @@ def _robot(told: Told, ground: Ground, row: int, place: Array) -> str:
     else:
         shape = f"M{x - 3:.1f},{y:.1f}a3,3 0 1 0 6,0a3,3 0 1 0 -6,0Z"
     said = f"{robots([system])}: {look}{', leads' if leads else ''}{', left behind' if left else ''}"
+    said += ", silent: here it was heard last" if silent else ""
     return element("path", hover(said), d=shape, class_=f"place {look}{' left' if left else ''}")
 
 
-def _numbers(told: Told, ground: Ground, last: Array, seen: Sequence[int]) -> list[str]:
+def _numbers(told: Told, ground: Ground, room: Room, last: Array, seen: Sequence[int]) -> list[str]:
     """Beside each robot, away from the others' middle; in a crowd only of those that matter."""
-    middle = np.array([ground.at(place) for place in last[list(seen)]]).mean(axis=0) if seen else np.zeros(2)
+    middle = np.array([ground.at(last[row]) for row in seen]).mean(axis=0) if seen else np.zeros(2)
     parts = []
     for row in seen:
         if told.crowded and told.looks[row] == "healthy":
             continue
-        at = np.array(ground.at(last[row]))
+        at, said = np.array(ground.at(last[row])), str(told.history.ids[row])
         away = (at - middle) / max(float(np.hypot(*(at - middle))), 1e-9)
-        x, y = at + AWAY * (away if np.hypot(*away) > 0.5 else np.array([1.0, 0.0]))
-        parts.append(words(x, y + 0.35 * TEXT, str(told.history.ids[row]), f"name {told.looks[row]}", anchor="middle"))
+        places = list(about(at, away if np.hypot(*away) > 0.5 else np.array([1.0, 0.0])))
+        x, y, anchor = room.place(said, places, over_lines=True)
+        parts.append(words(x, y, said, f"name {told.looks[row]}", anchor=anchor))
     return parts
 
 
-AWAY = 12.0
-"""Units from a robot to its number."""
-
-
-def _plan(told: Told, ground: Ground, flown: Array) -> list[str]:
-    """Legs, what an emergency call cut off, and a star at every target. flown: (K, 2) units that are drawn upon."""
+def _plan(told: Told, ground: Ground, room: Room) -> list[str]:
+    """Legs, what an emergency call cut off, and a star at every target."""
     parts, stars = [], []
     segments = told.plan.segments
-    for segment in segments:
+    for number, segment in enumerate(segments, start=1):
         parts.append(ground.way(np.array([segment.end_ne, segment.planned_end_ne]), "cut"))
         parts.append(ground.way(np.array([segment.start_ne, segment.end_ne]), "plan"))
-    for number, segment in enumerate(segments, start=1):
         x, y = ground.at(segment.planned_end_ne)
+        room.take((x - 8.0, y - 8.0, x + 8.0, y + 8.0))
         class_ = f"target {'last' if number == len(segments) else 'passed'}"
         stars.append(element("path", hover(f"target {number}: {segment.task}"), d=_star(x, y), class_=class_))
-        if len(segments) <= MOST_TASKS or number == len(segments):
-            stars.append(_task(ground, x, y, segment.task, flown))
     return parts + stars
 
 
@@ -201,30 +212,18 @@ MOST_TASKS = 6
 """Named on the map; of more, only the last."""
 
 
-def _task(ground: Ground, x: float, y: float, task: str, flown: Array) -> str:
-    """Its name beside, above or below a target: where least is drawn that it would cover."""
-    said = task if len(task) <= LONGEST_TASK else task[: LONGEST_TASK - 1] + "…"
-    width = LETTER * len(said)
-    west, east = ground.east.start + 2, ground.east.end
-    places = [(x + 12, y + 4, "start"), (x - 12, y + 4, "end")]
-    for base in (y - 12, y + 19):
-        if ground.north.end + TEXT < base < ground.north.start:
-            beyond = "end" if x + width / 2 > east else "start" if x - width / 2 < west else "middle"
-            places.append(({"end": east, "start": west, "middle": x}[beyond], base, beyond))
-
-    def covered(place: tuple[float, float, str]) -> int:
-        at, base, anchor = place
-        left = at - width * {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor]
-        inside = (flown > (left - 2, base - TEXT)) & (flown < (left + width + 2, base + 4))
-        outside = left < west or left + width > east
-        return int(inside.all(axis=1).sum()) + MUCH * outside
-
-    at, base, anchor = min(places, key=covered)
-    return words(at, base, said, "task", anchor=anchor)
-
-
-MUCH = 10**6
-"""Points: worse than to cover all that is drawn."""
+def _tasks(told: Told, ground: Ground, room: Room) -> list[str]:
+    """What is to be done at the targets, the last first: it stands where the robots do."""
+    segments = told.plan.segments
+    crowd = ground.round_(told.history.position[told.mission[-1], :, :2]) if told.mission.size else None
+    parts = []
+    for segment in reversed(segments if len(segments) <= MOST_TASKS else segments[-1:]):
+        task = segment.task
+        said = task if len(task) <= LONGEST_TASK else task[: LONGEST_TASK - 1] + "…"
+        places = list(around(*ground.at(segment.planned_end_ne), crowd if segment is segments[-1] else None))
+        x, y, anchor = room.place(said, places)
+        parts.append(words(x, y, said, "task", anchor=anchor))
+    return parts
 
 
 def _star(x: float, y: float) -> str:
@@ -241,4 +240,4 @@ def _in_words(told: Told) -> str:
     sent = f"Sent to “{told.plan.segments[-1].task}”"
     if told.score is None:
         return f"{sent}; the flight ended before its read-out."
-    return f"{sent}; the healthy robots' mean ended {told.score.distance_to_target_m:.1f} m from it."
+    return f"{sent}; {told.mean} ended {told.score.distance_to_target_m:.1f} m from it."

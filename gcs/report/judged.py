@@ -9,18 +9,18 @@ import numpy.typing as npt
 
 from gcs.mission import Plan
 from gcs.report.axes import Frame, framed
-from gcs.report.robots import Drawn, Section, key, line, names, swarm
+from gcs.report.robots import Drawn, Section, key, line, mean_key, names, swarm
 from gcs.report.series import closest_pair, distance_to_target, off_course_deg
 from gcs.report.svg import Label, element
 from gcs.report.told import Told
 from gcs.scoring import AIRBORNE, CONTACT, separation
+from gcs.words import robots
 from scenarios import offsets_ne
 
 Array = npt.NDArray[np.float64]
 
 MOST_LEGS = 4
 """Whose beginnings are all marked; of more, only the last and those that were called."""
-MEAN = ("mean", "mean of the healthy robots: what is judged")
 ALLOWED = ("limit", "allowed")
 
 
@@ -50,7 +50,7 @@ def heading(flights: Sequence[Told]) -> Section:
         "Heading error",
         "The angle between the leg and the way flown since the leg began. Just after a turn it leaves the chart, for "
         "the swarm still swings round; what counts is the dot, where the line of the mean ends.",
-        (MEAN, *key(flights), ALLOWED),
+        (_mean(flights), *key(flights), ALLOWED),
         tuple(drawn),
     )
 
@@ -73,16 +73,16 @@ def distance(flights: Sequence[Told]) -> Section:
     return Section(
         "distance",
         "Distance to the target",
-        "From the target of the leg being flown to the mean of the healthy robots. It jumps when a new target is "
-        "given; a swarm on its way falls in a straight line and ends below the dashed one.",
-        (MEAN, *key(flights), ALLOWED),
+        f"From the target of the leg being flown to {mean_key(flights)[1]}. It jumps when a new target is given; a "
+        "swarm on its way falls in a straight line and ends below the dashed one.",
+        (_mean(flights), *key(flights), ALLOWED),
         tuple(drawn),
     )
 
 
 def closeness(flights: Sequence[Told]) -> Section:
     """How close robots came to each other."""
-    gaps = [separation(told.history.position[told.mission]) if told.mission.size else np.empty(0) for told in flights]
+    gaps = [separation(told.position[told.mission]) if told.mission.size else np.empty(0) for told in flights]
     finite = [gap[np.isfinite(gap)] for gap in gaps]
     top = max(2.0 * CONTACT, *(1.1 * float(gap.max(initial=0.0)) for gap in finite))
     drawn = []
@@ -104,6 +104,11 @@ def closeness(flights: Sequence[Told]) -> Section:
         (("mean", "closest two robots"), ALLOWED, ("contact", f"rotors touch, {CONTACT:g} m")),
         tuple(drawn),
     )
+
+
+def _mean(flights: Sequence[Told]) -> tuple[str, str]:
+    class_, called = mean_key(flights)
+    return class_, f"{called}: what is judged"
 
 
 def mission_frame(
@@ -131,7 +136,7 @@ def marks(told: Told) -> list[Label]:
 def _measured(told: Told, measure: Callable[[Array, Array, Plan], Array]) -> tuple[Array, Array]:
     """A measure of each robot (T, N) and of the mean of those that are judged (T,), over the mission."""
     rows = told.mission
-    place = told.history.position[rows, :, :2] - offsets_ne(told.history.scenario)
+    place = told.position[rows, :, :2] - offsets_ne(told.history.scenario)
     mean = place[:, told.scored].mean(axis=1, keepdims=True)
     time_s = told.history.mission_s[rows]
     return measure(time_s, place, told.plan), measure(time_s, mean, told.plan)[:, 0]
@@ -156,7 +161,7 @@ def _judged(
     parts = [
         _level(frame, allowed, "limit"),
         *swarm(frame, told, told.mission, each),
-        line(frame, told, told.mission, mean, "mean", title="mean of the healthy robots"),
+        line(frame, told, told.mission, mean, "mean", title=told.mean),
         element("circle", cx=x, cy=y, r=3.5, class_="end"),
     ]
     svg = framed(
@@ -178,15 +183,25 @@ def _last(values: Array) -> float:
 def _closest(told: Told, gap: Array) -> str:
     if told.count == 1:
         return "One robot alone keeps its distance."
-    if not np.isfinite(gap).any():
+    if not told.mission.size:
         return "The mission never began."
+    if not np.isfinite(gap).any():
+        return "No two robots were in the air at a time."
     at = int(np.nanargmin(gap))
-    row = told.mission[at]
-    position = told.history.position[row]
+    position = told.position[told.mission[at]]
     airborne = np.where(position[:, 2:] < AIRBORNE, np.nan, position)
     first, second = (told.history.ids[index] for index in closest_pair(airborne))
     allowed = told.history.scenario.expect.min_separation_m
     return (
         f"Robots {first} and {second} came closest, {gap[at]:.2f} m at "
-        f"{told.history.mission_s[row]:.1f} s; allowed {allowed:g} m."
+        f"{told.since_s[told.mission[at]]:.1f} s; allowed {allowed:g} m{_unseen(told)}."
     )
+
+
+def _unseen(told: Told) -> str:
+    """Who was left out of it for a while."""
+    if not told.history.measured:
+        return ""
+    mute = [told.history.ids[row] for row in np.flatnonzero(told.silent[told.mission].any(axis=0))]
+    where = "it was" if len(mute) == 1 else "they were"
+    return f". While silent, {robots(mute)} did not count: nobody knows where {where}" if mute else ""

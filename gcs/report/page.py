@@ -66,6 +66,7 @@ def page(histories: Sequence[History]) -> str:
 def _account(told: Told) -> Account:
     history = told.history
     facts = {"recording": str(history.path.resolve()), **history.metadata}
+    facts |= {f"recovered, {name.replace('_', ' ')}": said for name, said in (history.recovered or {}).items()}
     return Account(
         name=told.name,
         paragraphs=story(told),

@@ -48,11 +48,30 @@ class Section:
 def key(flights: Sequence[Told]) -> tuple[tuple[str, str], ...]:
     """How robots are drawn, as far as there are such."""
     found = {look for told in flights for look in told.looks}
-    healthy = ("robot healthy", "each healthy robot")
+    known = all(told.faults_known for told in flights)
+    every = "each healthy robot" if known else "each robot"
+    all_ = "all healthy robots" if known else "all robots"
+    drawn = (
+        ("healthy", "robot healthy", every),
+        ("failed", "robot failed", "failed robot"),
+        ("doubted", "robot doubted", "healthy, but distrusted" if known else "distrusted"),
+    )
     if any(told.crowded for told in flights):
-        healthy = ("band bar", "all healthy robots lie within, the line is their median")
-    named = (("failed", "failed robot"), ("doubted", "healthy, but distrusted"))
-    return (healthy, *((f"robot {look}", words) for look, words in named if look in found))
+        drawn = (("healthy", "band bar", f"{all_} lie within, the line is their median"), *drawn[1:])
+    return tuple((class_, words) for look, class_, words in drawn if look in found)
+
+
+def judged(flights: Sequence[Told]) -> str:
+    """How those are called that flights are judged by, if it is the same in all."""
+    called = {told.judged for told in flights}
+    return called.pop() if len(called) == 1 else "those that are judged"
+
+
+def mean_key(flights: Sequence[Told]) -> tuple[str, str]:
+    """How their mean is drawn."""
+    called = {told.mean for told in flights}
+    of = called.pop() if len(called) == 1 else f"the mean of {judged(flights)}"
+    return "mean", of.removeprefix("the ")
 
 
 def swarm(frame: Frame, told: Told, rows: Rows, values: Array) -> list[str]:
@@ -102,7 +121,7 @@ def _band(frame: Frame, told: Told, rows: Rows, values: Array) -> list[str]:
     middle[known] = np.nanmedian(values[known], axis=1)
     time, low, high = (_broken(told, rows, part) for part in (told.since_s[rows], least, most))
     band = area(frame.time(time), frame.value.within(low), frame.value.within(high), "band")
-    return [band, line(frame, told, rows, middle, "robot healthy", title="median of the healthy robots")]
+    return [band, line(frame, told, rows, middle, "robot healthy", title="median")]
 
 
 def _broken(told: Told, rows: Rows, values: Array) -> Array:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
+from gcs.gate import LOST_NS
 from gcs.mission import Plan, plan
 from gcs.recording.history import History
 from gcs.scoring import DISTRUSTED, Score, score, scored_robots
 from gcs.summary import trust_of
 from gcs.track import Parts
-from scenarios import healthy_robots
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -78,21 +79,66 @@ class Told:
         """Every row of the history."""
         return np.arange(len(self.history.number))
 
+    @property
+    def faults_known(self) -> bool:
+        """Whether it is known what was wrong, be it that the scenario is taken at its word."""
+        return self.history.faults_by != "unknown"
+
+    @cached_property
+    def onsets(self) -> Mapping[int, float]:
+        """System id → when the first of its faults began, of those that acted; nobody where that is not known."""
+        return self.history.onsets
+
+    @cached_property
+    def meant(self) -> Flags:
+        """(N,) whom it is to be judged by."""
+        return scored_robots(self.history.scenario, known=self.faults_known)
+
     @cached_property
     def scored(self) -> Flags:
-        """(N,) whom it is judged by."""
-        return scored_robots(self.history.scenario)
+        """(N,) whom it is judged by: as meant, but for robots that telemetry had lost at hand-over or read-out."""
+        if self.score is None:
+            return self.meant
+        times_s = self.history.mission_s[self.mission]
+        rows = self.mission[np.searchsorted(times_s, [self.plan.hand_over_s - 1e-9, self.plan.read_out_s - 1e-9])]
+        return self.meant & np.isfinite(self.position[rows]).all(axis=(0, 2))
+
+    @property
+    def judged(self) -> str:
+        """How those are called."""
+        if self.count == 1:
+            return "the robot"
+        healthy = self.faults_known and not any(self.meant[system - 1] for system in self.onsets)
+        return "the healthy robots" if healthy else "all robots"
+
+    @property
+    def mean(self) -> str:
+        """How the mean of them is called."""
+        return self.judged if self.count == 1 else f"the mean of {self.judged}"
 
     @cached_property
     def looks(self) -> tuple[str, ...]:
-        """(N,) how each is drawn: failed, doubted (distrusted without a fault of its own) or healthy."""
+        """(N,) how each is drawn: failed, doubted (distrusted, and no fault of its own is known) or healthy."""
         trusted = np.ones(self.count, bool)
         if self.trust_source is not None:
             trusted = ~np.any(self.history.trust[self.mission] < DISTRUSTED, axis=0)
-        sound = zip(healthy_robots(self.history.scenario).tolist(), trusted.tolist(), strict=True)
+        robots = zip(self.history.ids, trusted.tolist(), strict=True)
         return tuple(
-            "failed" if not healthy else "healthy" if is_trusted else "doubted" for healthy, is_trusted in sound
+            "failed" if system in self.onsets else "healthy" if is_trusted else "doubted"
+            for system, is_trusted in robots
         )
+
+    @cached_property
+    def silent(self) -> Flags:
+        """(T, N) whose telemetry was taken for lost."""
+        return np.asarray(self.history.age_s > LOST_NS / 1e9)
+
+    @cached_property
+    def position(self) -> Array:
+        """(T, N, 3) as in the history, but NaN where it is only what a silent robot told before."""
+        if not self.history.measured:
+            return self.history.position
+        return np.where(self.silent[..., None], np.nan, self.history.position)
 
     @property
     def crowded(self) -> bool:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from gcs.recording.history import Kind
+from gcs.report.distrust import distrusts
 from gcs.report.series import heeded
+from gcs.report.telling import counted, some
 from gcs.report.told import Told
-from gcs.words import faults, robots
+from gcs.words import ending, faults, robots
 
 PASSED, FAILED, NEITHER = "good", "bad", ""
 """How a cell is marked."""
@@ -64,9 +67,7 @@ def verdicts(flights: Sequence[Told]) -> Table:
 
 def _verdict(told: Told) -> tuple[Cell, ...]:
     score, expect = told.score, told.history.scenario.expect
-    wrong = faults(told.history.scenario)
-    untold = Cell("–")
-    judged = (untold, untold, untold)
+    judged = (Cell("–"), Cell("–"), Cell("–"))
     if score is not None:
         judged = (
             _at_most(score.heading_error_deg, expect.heading_error_deg, "°"),
@@ -74,24 +75,42 @@ def _verdict(told: Told) -> tuple[Cell, ...]:
             _apart(score.min_separation_m, expect.min_separation_m),
         )
     left = told.parts_at_the_end().left_behind
-    return (
-        _ended(told),
-        *judged,
-        Cell("; ".join(wrong[:3]) + (f"; {len(wrong) - 3} more" if len(wrong) > 3 else "") or "nothing"),
-        _distrusted(told),
-        Cell(robots(left) if left else "nobody"),
-    )
+    return (_ended(told), *judged, _wrong(told), _distrusted(told), Cell(robots(left) if left else "nobody"))
 
 
 def _ended(told: Told) -> Cell:
-    grounds = ["by telemetry: no truth was told"] if told.history.measured else []
-    grounds += ["from a recovered recording"] if told.history.recovered is not None else []
-    rests_on = "; ".join(grounds)
-    if told.history.problem is not None:
-        return Cell("not completed", told.history.problem, FAILED)
-    if told.score is None:
-        return Cell("no score", "ended before its read-out", FAILED)
-    return Cell("passed", rests_on, PASSED) if told.passed else Cell("failed", rests_on, FAILED)
+    """How it ended, and what that rests on."""
+    ended = ending(told.history.problem, None if told.score is None else told.score.passed)
+    return Cell(ended.word, "; ".join(filter(None, (ended.why, *_grounds(told)))), PASSED if ended.good else FAILED)
+
+
+def _grounds(told: Told) -> Iterator[str]:
+    history = told.history
+    if told.score is None and history.problem is None:
+        yield from [one.words for one in history.happenings if one.kind is Kind.WORD and one.vehicle is None][-1:]
+    if history.measured:
+        yield "by telemetry: no truth was told"
+        mute = [history.ids[row] for row in np.flatnonzero(told.meant & ~told.scored)]
+        if mute:
+            yield f"without {robots(mute)}, lost by telemetry"
+    if history.recovered is not None:
+        yield "from a recovered recording"
+
+
+def _wrong(told: Told) -> Cell:
+    """What acted, as far as that is known."""
+    if not told.faults_known:
+        planned = faults(told.history.scenario)
+        return Cell("unknown", f"the scenario has {some(planned, most=MOST_FAULTS)}" if planned else "")
+    acted = list(dict.fromkeys(span.words for span in told.history.acted))
+    return Cell(
+        some(acted, most=MOST_FAULTS, between="; ") if acted else "nothing",
+        "as the scenario has it" if told.history.faults_by == "planned" else "",
+    )
+
+
+MOST_FAULTS = 3
+"""Named in a cell."""
 
 
 def _at_most(value: float, allowed: float, unit: str) -> Cell:
@@ -100,7 +119,7 @@ def _at_most(value: float, allowed: float, unit: str) -> Cell:
 
 def _apart(value: float, allowed: float) -> Cell:
     if math.isinf(value):
-        return Cell("–", "one robot alone")
+        return Cell("–", "no two in the air")
     return Cell(f"{value:.1f} m", f"at least {allowed:g} m", PASSED if value >= allowed else FAILED)
 
 
@@ -108,14 +127,17 @@ def _distrusted(told: Told) -> Cell:
     """Who was rightly distrusted, how soon, and how many wrongly."""
     if told.trust_source is None:
         return Cell("–", "asks for no trust")
-    if told.score is None:
+    if not told.mission.size:
         return Cell("–")
-    found = [f"robot {system}: {after_s:.1f} s" for system, after_s in told.score.detected.items()]
-    failed = [system for system, look in zip(told.history.ids, told.looks, strict=True) if look == "failed"]
-    missed = [system for system in failed if system not in told.score.detected]
-    wrongly = told.score.false_alarms
+    about = distrusts(told)
+    if not told.faults_known:
+        fell = [f"robot {one.system}: at {one.wrongly_s:.1f} s" for one in about]
+        return Cell("; ".join(fell) or "nobody", "nobody knows whether rightly" if fell else "")
+    found = [f"robot {one.system}: {one.delay_s:.1f} s" for one in about if one.found]
+    missed = [one.system for one in about if one.missed]
+    wrongly = sum(one.wronged for one in about)
     notes = [f"never: {robots(missed)}"] if missed else []
-    notes.append(f"{wrongly} false alarm{'' if wrongly == 1 else 's'}" if wrongly else "no false alarm")
+    notes.append(counted(wrongly, "false alarm") if wrongly else "no false alarm")
     mark = FAILED if missed or wrongly else PASSED if found else NEITHER
     return Cell("; ".join(found) or "nobody", ", ".join(notes), mark)
 

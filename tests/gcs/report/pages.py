@@ -8,9 +8,9 @@ import numpy as np
 from flights import SHORT, fly_and_record, recorded
 
 from gcs.events import Rating
+from gcs.gate import LOST_NS
 from gcs.mission import plan
-from gcs.recording.happenings import FaultSpan
-from gcs.recording.history import load
+from gcs.recording.history import FaultSpan, load
 from gcs.track import Parts, Track
 from scenarios import load as scenario_of
 from scenarios import offsets_ne
@@ -31,10 +31,26 @@ def unreached():
     return load(fly_and_record("demo", *SHORT, "time.timeout_s=4").path)
 
 
+def believing(history, trust):
+    """The same flight, but with this trust (T, N)."""
+    return replace(history, trust=trust, track=replace(history.track, trust=trust))
+
+
+def live(history, *, silent=(), from_s=5.0):
+    """The same flight as telemetry told it: nothing tells the truth, and some robots fall silent for good."""
+    rows = [system - 1 for system in silent]
+    since = np.maximum(history.mission_s - from_s, 0.0)
+    position, age_s, last = history.position.copy(), history.age_s.copy(), int(np.argmax(since > 0.0))
+    position[last:, rows], age_s[:, rows] = position[last, rows], since[:, None]
+    known = np.where((age_s > LOST_NS / 1e9)[..., None], np.nan, position)
+    track = replace(history.track, position=known, measured=True, faults_known=False)
+    return replace(history, position=position, age_s=age_s, measured=True, faults=(), faults_by="unknown", track=track)
+
+
 def dragged(rows, columns, *overrides, said=()):
     """The emergency of any number of robots that keep to the plan, but the failed one, which stays at home.
 
-    It is distrusted 2 s after mission start. said: ratings.
+    It is distrusted 2 s after mission start. said: ratings;  the fault begins when the scenario has it.
     """
     scenario = scenario_of("emergency", overrides=(f"swarm.rows={rows}", f"swarm.columns={columns}", *overrides))
     path, count = plan(scenario), scenario.swarm.count
@@ -48,6 +64,7 @@ def dragged(rows, columns, *overrides, said=()):
     trust = np.ones((ticks, count))
     trust[mission_s >= 2.0, failed] = 0.1
     weights = np.full((ticks, count, count), 1.0 / count)
+    onset_s = scenario.fault[0].onset_s
     nothing = np.zeros((ticks, count, 3))
     parts = (Parts(0.0, scenario.swarm.leaders, ()),)
     return replace(
@@ -82,7 +99,7 @@ def dragged(rows, columns, *overrides, said=()):
         virtual_velocity_ne=np.zeros((ticks, 2)),
         ratings=tuple(Rating(*one) for one in said),
         parts=parts,
-        faults=(FaultSpan(failed + 1, "motor_degradation", 0.0, np.inf, f"robot {failed + 1} at 40% speed"),),
+        faults=(FaultSpan(failed + 1, "motor_degradation", onset_s, np.inf, f"robot {failed + 1} at 40% speed"),),
         happenings=(),
         links=None,
         track=Track(mission_s, position, trust, virtual, measured=False, parts=parts),

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pages import AUTO, AVERAGE, dragged, flown, unreached
+from pages import AUTO, AVERAGE, believing, dragged, flown, live, unreached
 
 from gcs.recording.history import Links
 from gcs.report.believed import trust, weights
@@ -93,10 +93,10 @@ def test_a_robot_doubted_without_a_fault_is_drawn_as_such():
     history = dragged(2, 3)
     trusts = history.trust.copy()
     trusts[50:60, 1] = 0.2
-    flight = told(replace(history, trust=trusts))
+    flight = told(believing(history, trusts))
     assert flight.looks == ("healthy", "doubted", "healthy", "healthy", "failed", "healthy")
     assert ("robot doubted", "healthy, but distrusted") in key([flight])
-    assert "robot 2 without a fault" in trust([flight]).charts[0].words
+    assert "robot 2 was distrusted at 5.0 s without a fault" in trust([flight]).charts[0].words
 
 
 def test_the_truth_is_drawn_under_trust_a_strip_for_each_who_failed():
@@ -110,6 +110,54 @@ def test_ratings_are_marks_with_their_values():
     drawn = trust([told(dragged(2, 3, said=said))]).charts[0].svg
     assert re.findall(r'class="value"[^>]*>(\d)', drawn) == ["2", "1", "4"]
     assert "op1 rates robot 5 2 of 5" in drawn
+
+
+def test_a_flood_of_ratings_is_thinned_and_lies_beneath_the_lines():
+    said = [(f"op{system}", system, 1, 0.1 * tick) for tick in range(240) for system in range(1, 7)]
+    plain, drawn = (trust([told(dragged(2, 3, said=some))]).charts[0].svg for some in ((), said))
+    assert drawn.count("<circle") <= 60
+    assert len(drawn) < len(plain) + 10_000
+    assert drawn.rindex('class="rating') < drawn.index('class="robot')
+    assert "11 more of 1 up to" in drawn
+
+
+def test_a_robot_that_fell_silent_counts_for_nothing_where_nobody_knows_its_place():
+    history = live(dragged(2, 3), silent=[2])
+    said = closeness([told(history)]).charts[0].words
+    assert "2 and" not in said
+    assert said.endswith("While silent, robot 2 did not count: nobody knows where it was.")
+    truly = replace(history, measured=False)
+    assert "Robots 2 and 6 came closest, 0.08 m" in closeness([told(truly)]).charts[0].words
+
+
+def test_links_name_who_fell_silent():
+    said = links([told(live(dragged(2, 3), silent=[3]))]).charts[0].words
+    assert "Robot 3 was not heard for " in said
+    assert "to the end; telemetry of the others was never older than 0.00 s." in said
+
+
+def test_where_nobody_told_the_truth_nobody_is_called_healthy_or_failed():
+    flight = told(live(dragged(2, 3)))
+    assert flight.looks == ("healthy", "healthy", "healthy", "healthy", "doubted", "healthy")
+    assert [words for _, words in key([flight])] == ["each robot", "distrusted"]
+    assert "Trust fell below one half in robot 5 at 2.0 s" in trust([flight]).charts[0].words
+    assert flight.mean == "the mean of all robots"
+    for section in SECTIONS:
+        chart = section([flight])
+        legend = [words for _, words in chart.legend]
+        assert "healthy" not in f"{chart.look_for} {chart.charts[0].words} {legend}"
+
+
+def test_where_nobody_is_healthy_no_mean_of_the_healthy_is_told():
+    lone = told(dragged(1, 1, "fault.0.vehicle=1", "swarm.leaders=[1]"))
+    for section in (courses, heading, distance):
+        drawn = section([lone])
+        assert "healthy robots" not in f"{drawn.look_for} {drawn.legend} {drawn.charts}"
+
+
+@pytest.mark.parametrize("rule", ["average", "wmsr-1"])
+def test_of_a_rule_that_asks_for_no_trust_nothing_else_is_claimed(rule):
+    assert trust([told(dragged(2, 3, f'control.rule="{rule}"'))]).charts[0].words == "This rule asks for no trust."
 
 
 def test_set_points_that_the_gate_changed_are_drawn_robot_by_robot():

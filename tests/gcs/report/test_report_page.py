@@ -41,12 +41,17 @@ SEEN = """() => {
       box: [box.left, box.top + 2, box.right, box.bottom - 2],
     };
   });
+  const marks = [...document.querySelectorAll("#map .place, #map .target")].map(node => {
+    const box = node.getBoundingClientRect();
+    return {chart: node.closest("svg").getAttribute("aria-label"), class_: node.getAttribute("class"),
+            box: [box.left, box.top, box.right, box.bottom]};
+  });
   document.querySelectorAll("details").forEach(node => node.open = true);
   const words = [...document.querySelectorAll("body *")]
     .filter(node => !node.closest("svg") && [...node.childNodes].some(one => one.nodeType === 3 && one.data.trim()))
     .map(node => [node.textContent.trim().slice(0, 40), contrast(getComputedStyle(node).color, ground(node))]);
   return {
-    texts, words, wide: document.documentElement.scrollWidth, window: innerWidth,
+    texts, words, marks, wide: document.documentElement.scrollWidth, window: innerWidth,
     charts: [...document.querySelectorAll("figure svg")].map(node => node.getAttribute("aria-label")),
   };
 }"""
@@ -70,20 +75,28 @@ def html():
     return page(histories)
 
 
-@pytest.fixture(scope="module", params=VIEWS, ids=lambda view: f"{view[0]}-{view[1]}")
-def shown(request, browser, html, tmp_path_factory):
-    """What is to be seen, what the console said and what was asked of the network."""
-    width, scheme = request.param
+@pytest.fixture(scope="module")
+def tab(browser, html, tmp_path_factory):
+    """The page, what the console said and what was asked of the network."""
     file = tmp_path_factory.mktemp("report") / "report.html"
     file.write_text(html, encoding="utf-8")
-    tab = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
+    tab = browser.new_page()
     complaints, requests = [], []
     tab.on("console", lambda message: complaints.append(message.text))
     tab.on("pageerror", lambda error: complaints.append(str(error)))
     tab.on("request", lambda asked: requests.append(asked.url))
     tab.goto(file.as_uri())
-    yield tab.evaluate(SEEN), complaints, requests
-    tab.close()
+    return tab, complaints, requests
+
+
+@pytest.fixture(scope="module", params=VIEWS, ids=lambda view: f"{view[0]}-{view[1]}")
+def shown(request, tab):
+    """What is to be seen, what the console said and what was asked of the network."""
+    width, scheme = request.param
+    page, complaints, requests = tab
+    page.set_viewport_size({"width": width, "height": 900})
+    page.emulate_media(color_scheme=scheme)
+    return page.evaluate(SEEN), complaints, requests
 
 
 def test_a_browser_has_nothing_to_complain_about_and_asks_nobody_for_anything(shown):
@@ -121,6 +134,15 @@ def test_no_words_of_a_chart_over_time_overlap(shown):
             if _overlap(one["box"], other["box"])
         ]
         assert touching == [], section
+
+
+def test_no_word_on_a_map_covers_another_or_a_mark(shown):
+    seen, _, _ = shown
+    words = [text for text in seen["texts"] if text["section"] == "map" and text["class_"].startswith(("task", "name"))]
+    assert len(words) > 20
+    for index, one in enumerate(words):
+        there = words[index + 1 :] + seen["marks"]
+        assert [other for other in there if _overlap(one["box"], other["box"])] == [], one["said"]
 
 
 def _overlap(one, other):
