@@ -21,12 +21,15 @@ from gcs.gate import LOST_NS
 from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
 from gcs.mission import plan
 from gcs.recording.files import FAULTS, MADE, METADATA, SCENARIO, SUMMARY
+from gcs.recording.mcap_file import MAGIC
 from gcs.track import Parts, Point, Track
 from scenarios import Scenario, names
 from wire.frames import Frame, Framer
 
 RECORDING = "run.mcap"
 """A run's recording in its folder."""
+LOG = ".tlog"
+"""How the names of logs of frames end: a journal, or another ground station's."""
 RECORD_SIZE_LIMIT = 64 << 20
 DAMAGE = (McapError, struct.error, LookupError, ValueError, TypeError, RuntimeError, OverflowError, MemoryError)
 """What a torn, flipped or foreign file makes the readers raise: mcap's own, LZ4's, and those of what they hand on."""
@@ -108,7 +111,7 @@ def instead_of_scenario(name: str) -> Path | None:
     """The recording that was named where a scenario may be; None if it is one. Scenarios that ship come first."""
     with suppress(OSError):  # too long a name, say
         path = located(Path(name))
-        return path if path.suffix == ".mcap" and name not in names() else None
+        return path if path.suffix in (".mcap", LOG) and name not in names() else None
     return None
 
 
@@ -135,6 +138,8 @@ def _messages(stream: BinaryIO) -> Iterator[Message]:
 @contextmanager
 def readable(path: Path) -> Iterator[None]:
     """Whatever is wrong with the file becomes one sentence."""
+    if path.suffix == LOG:
+        raise UnreadableRecording(f"{path}: a log of frames; gcs log import makes a recording of it")
     try:
         yield
     except UnreadableRecording:
@@ -144,10 +149,16 @@ def readable(path: Path) -> Iterator[None]:
     except ValidationError:
         raise UnreadableRecording(f"{path}: its {SCENARIO} is no scenario of this version") from None
     except DAMAGE as error:
+        if not _begins_as_mcap(path):
+            raise UnreadableRecording(f"{path}: not an MCAP file, or its beginning is lost") from None
         said = " ".join(str(error).split()) or type(error).__name__
-        raise UnreadableRecording(
-            f"{path}: torn, damaged or not an MCAP file: {said}; gcs log recover FILE rebuilds it"
-        ) from None
+        raise UnreadableRecording(f"{path}: torn or damaged: {said}; gcs log recover FILE rebuilds it") from None
+
+
+def _begins_as_mcap(path: Path) -> bool:
+    with suppress(OSError), path.open("rb") as stream:
+        return stream.read(len(MAGIC)) == MAGIC
+    return False
 
 
 CUT_SHORT = "the recording ends before the flight did"

@@ -128,9 +128,9 @@ def test_a_wind_on_everyone_is_nobodys_failure(gcs):
 
 def test_a_file_that_is_no_recording_or_a_torn_one_is_refused(gcs, tmp_path):
     data = recorded("demo").path.read_bytes()
-    for content in (b"", b"hello\n" * 100, data[: len(data) // 2]):
+    for content, why in ((b"", "not an MCAP"), (b"hello\n" * 100, "not an MCAP"), (data[: len(data) // 2], "torn")):
         (tmp_path / "run.mcap").write_bytes(content)
-        refused(gcs(tmp_path / "run.mcap"), "torn, damaged or not an MCAP file")
+        refused(gcs(tmp_path / "run.mcap"), why)
 
 
 def cut_short(after_s):

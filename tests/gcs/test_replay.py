@@ -344,5 +344,16 @@ def test_a_torn_recording_is_refused_in_a_sentence(tmp_path):
     data = recorded(*BRIEF).path.read_bytes()
     for part in np.linspace(0.05, 0.99, 7):
         (tmp_path / "torn.mcap").write_bytes(data[: int(len(data) * part)])
-        with pytest.raises(UnreadableRecording, match=r"torn\.mcap: torn, damaged or not an MCAP file"):
+        with pytest.raises(UnreadableRecording, match=r"torn\.mcap: torn or damaged: .*gcs log recover"):
             decide_again(tmp_path / "torn.mcap")
+
+
+def test_what_is_no_recording_is_not_promised_to_be_recovered(gcs, tmp_path):
+    (tmp_path / "run.tlog").write_bytes(b"frames")
+    (tmp_path / "picture.png").write_bytes(b"\x89PNG\r\n" * 9)
+    log_of_frames = f"gcs: {tmp_path / 'run.tlog'}: a log of frames; gcs log import makes a recording of it\n"
+    for words in (("replay",), ("replay", "--verify"), ("replay", "--controller", "average"), ("run",)):
+        assert gcs(*words, tmp_path / "run.tlog") == (2, "", log_of_frames)
+    not_one = f"gcs: {tmp_path / 'picture.png'}: not an MCAP file, or its beginning is lost\n"
+    assert gcs("replay", tmp_path / "picture.png") == (2, "", not_one)
+    assert gcs("replay", "--verify", tmp_path / "picture.png") == (2, "", not_one)
