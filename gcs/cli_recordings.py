@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import App, Parameter
 
 from gcs import console
-from gcs.choices import AS_IT_IS, Choices
+from gcs.choices import AS_IT_IS, BadUsageError, Choices
 from gcs.guard import DONE, guarded
 from gcs.options import AsJson
 
@@ -54,7 +55,7 @@ def replay(
         bool, Parameter(negative=(), show_default=False, help="--to may name another machine.")
     ] = False,
     foxglove: Annotated[bool, Parameter(negative=(), show_default=False, help="Serve Foxglove live.")] = False,
-    foxglove_port: Annotated[int, Parameter(help="On loopback.")] = 8765,
+    foxglove_port: Annotated[int | None, Parameter(help="On loopback; 8765 if absent.")] = None,
     json: AsJson = False,
 ) -> int:
     """Play a recorded flight by its time, on the screen and to other tools; or decide it again and compare.
@@ -63,6 +64,17 @@ def replay(
     """
 
     def command() -> int:
+        playing_alone = {
+            "--speed": speed != 1.0,
+            "--reverse": reverse,
+            "--from": from_ is not None,
+            "--to": to is not None,
+            "--to-network": to_network,
+            "--foxglove": foxglove,
+            "--foxglove-port": foxglove_port is not None,
+        }
+        if verify or choices != AS_IT_IS:
+            _refuse(playing_alone, "nothing is played where a flight is decided again")
         if verify:
             from gcs.replay.verify import verify as decide_again
 
@@ -73,18 +85,33 @@ def replay(
             return what_if(recording, choices, as_json=json, console=console.stdout())
         from gcs.replay.command import Playing, play
 
+        if to is None:
+            _refuse({"--to-network": to_network}, "nothing is sent without --to")
+        if not foxglove:
+            _refuse({"--foxglove-port": foxglove_port is not None}, "nothing is served without --foxglove")
         playing = Playing(
             speed=speed,
             reverse=reverse,
             begin=from_,
             to=to,
             to_network=to_network,
-            foxglove_port=foxglove_port if foxglove else None,
+            foxglove_port=(FOXGLOVE_PORT if foxglove_port is None else foxglove_port) if foxglove else None,
             as_json=json,
         )
         return play(recording, playing)
 
     return guarded(command)
+
+
+FOXGLOVE_PORT = 8765
+"""Where Foxglove looks for a server."""
+
+
+def _refuse(options: Mapping[str, bool], why: str) -> None:
+    """Options that would do nothing. options: → whether it was given. Raises BadUsageError."""
+    given = ", ".join(option for option, there in options.items() if there)
+    if given:
+        raise BadUsageError(f"{given}: {why}")
 
 
 log = App(name="log", help="What is in a recording; recover, export and import recordings.")
