@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -16,6 +16,7 @@ import orjson
 from gcs import console
 from gcs.choices import BadUsageError
 from gcs.guard import DONE
+from gcs.recording.reader import located
 from gcs.replay import timeline as timelines
 from gcs.replay.controls import Controls, pressed
 from gcs.replay.outputs import Output
@@ -29,8 +30,12 @@ TURN_NS = 10_000_000
 """Real time between two looks at what is due."""
 LONGEST_TURN_NS = 200_000_000
 """Of real time, a turn counts no more: a replay that was stopped goes on where it was, and sends nothing in a burst."""
+IDLE_NS = 100_000_000
+"""The same while it is paused; a key ends it at once."""
 WORD_NS = 1_000_000_000
 """Real time between two words where there is no terminal."""
+LARGE = 20 << 20
+"""Bytes of a recording that takes a while to be read."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,6 +94,7 @@ def play(recording: Path, playing: Playing) -> int:
     """Play it: with keys on a terminal, else to its end. Raises BadUsageError and UnreadableRecording."""
     speed = _speed(playing.speed)
     connection = None if playing.to is None else checked(playing.to, network=playing.to_network)
+    _announce(located(recording))
     timeline = timelines.load(recording)
     player = _player(timeline, playing, speed)
     with ExitStack() as stack:
@@ -100,9 +106,21 @@ def play(recording: Path, playing: Playing) -> int:
 
             outputs.append(stack.enter_context(closing(FoxgloveOutput(playing.foxglove_port))))
         playback = Playback(timeline, reel, outputs)
-        ended = _attended(playback, player) if _on_a_terminal() else _unattended(playback, player)
-    _tell(playing, playback, player, ended, None if udp is None else udp.sent)
+        try:
+            (_attended if _on_a_terminal() else _unattended)(playback, player)
+        except KeyboardInterrupt:
+            _tell(playing, playback, player, udp)
+            raise
+    _tell(playing, playback, player, udp)
     return DONE
+
+
+def _announce(path: Path) -> None:
+    """That a large recording is being read, for whoever waits."""
+    with suppress(OSError):
+        size = path.stat().st_size
+        if size >= LARGE:
+            console.say(f"reading {path}, {size / 1e6:.0f} MB")
 
 
 def _speed(speed: float) -> Fraction:
@@ -138,20 +156,24 @@ class Playback:
         self.timeline = timeline
         self.messages = 0
         """Put out."""
+        self.reached: Player | None = None
+        """How far it is played; None before it begins."""
         self._reel = reel
         self._outputs = outputs
 
     def run(self, player: Player, seat: Seat, show: Show, *, stay: bool) -> Player:
         """Until it is quit, or, unless somebody is to stay, until the end in this direction."""
-        controls, now_ns = Controls(player), seat.now()
+        controls, now_ns, self.reached = Controls(player), seat.now(), player
         while not controls.done and (stay or not controls.player.paused):
-            typed, before_ns = seat.wait(now_ns + TURN_NS), now_ns
+            turn_ns = IDLE_NS if controls.player.paused else TURN_NS
+            typed, before_ns = seat.wait(now_ns + turn_ns), now_ns
             now_ns = seat.now()
             moved, span = controls.player.advance(min(now_ns - before_ns, LONGEST_TURN_NS))
             self._put(span)
             controls = replace(controls, player=moved)
             for key in typed:
                 controls = self._press(controls, key)
+            self.reached = controls.player
             show(controls, now_ns, at_once=bool(typed))
         return controls.player
 
@@ -173,10 +195,11 @@ class Playback:
 
 
 def _on_a_terminal() -> bool:
-    return all(stream.isatty() for stream in (sys.stdin, sys.stdout, sys.stderr))
+    """Whether somebody sits there: keys are read from stdin, and the screen is on stderr."""
+    return sys.stdin.isatty() and sys.stderr.isatty() and not console.stderr().is_dumb_terminal
 
 
-def _attended(playback: Playback, player: Player) -> Player:
+def _attended(playback: Playback, player: Player) -> None:
     from gcs.replay.screen import Screen
     from gcs.replay.terminal import Keyboard
     from gcs.replay.view import seer
@@ -185,7 +208,7 @@ def _attended(playback: Playback, player: Player) -> Player:
     with Reel(timeline.path) as reel:
         screen = Screen(console.stderr(), timeline, seer(timeline, reel), title=_title(timeline))
         with Keyboard(WallClock(), leave=screen.leave, enter=screen.enter) as keyboard:
-            return playback.run(player, keyboard, screen.show, stay=True)
+            playback.run(player, keyboard, screen.show, stay=True)
 
 
 def _title(timeline: Timeline) -> str:
@@ -198,13 +221,13 @@ def _title(timeline: Timeline) -> str:
     )
 
 
-def _unattended(playback: Playback, player: Player) -> Player:
-    return playback.run(player, Unattended(WallClock()), Words(playback.timeline), stay=False)
+def _unattended(playback: Playback, player: Player) -> None:
+    playback.run(player, Unattended(WallClock()), Words(playback.timeline), stay=False)
 
 
-def _tell(playing: Playing, playback: Playback, begun: Player, ended: Player, sent: int | None) -> None:
+def _tell(playing: Playing, playback: Playback, begun: Player, udp: UdpOutput | None) -> None:
     """What was played, on stdout."""
-    timeline = playback.timeline
+    timeline, ended = playback.timeline, playback.reached or begun
     from_s, to_s = (round(timeline.seconds(player.position_ns), 3) for player in (begun, ended))
     if playing.as_json:
         console.write(
@@ -216,10 +239,19 @@ def _tell(playing: Playing, playback: Playback, begun: Player, ended: Player, se
                     "speed": playing.speed,
                     "reverse": playing.reverse,
                     "messages": playback.messages,
-                    "frames_sent": sent,
+                    "frames_sent": None if udp is None else udp.sent,
+                    "frames_held_back": None if udp is None else dict(udp.held_back),
                 }
             )
         )
         return
-    to = "" if sent is None else f", {sent} frames to {playing.to}"
+    to = "" if udp is None else f", {udp.sent} frames to {playing.to}{_of_frames(udp)}"
     console.report(f"{timeline.path} from {from_s:.1f} s to {to_s:.1f} s: {playback.messages} messages{to}")
+
+
+def _of_frames(udp: UdpOutput) -> str:
+    """What else is to be said of them."""
+    said = ", where nobody listened at times" if udp.refused else ""
+    if udp.held_back:
+        said += f"; {udp.held_back.total()} frames of vehicles held back ({', '.join(sorted(udp.held_back))})"
+    return said

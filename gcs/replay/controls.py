@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from gcs.choices import BadUsageError
 from gcs.replay.player import REACTION_NS, Player, Span
-from gcs.replay.timeline import Timeline
+from gcs.replay.timeline import NoSuchPlace, Timeline
 
 HELP = (
     ("space", "pause"),
+    ("q", "quit"),
     ("←→", "step"),
     ("+−", "speed"),
     ("r", "reverse"),
     ("n p", "event"),
     ("g", "go to"),
-    ("q", "quit"),
     ("Home End", "first, last"),
 )
-"""For the bottom of the screen; what does not fit there is left out from behind."""
+"""For the bottom of the screen, the most needed first: from the first that does not fit there, all are left out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +84,8 @@ def _typed(controls: Controls, typed: str, key: str, timeline: Timeline) -> Pres
         controls = replace(controls, typed=None)
         try:
             return _moved(controls, controls.player.at(timeline.place(typed)))
-        except BadUsageError as error:
-            return Pressed(replace(controls, note=str(error)))
+        except NoSuchPlace as error:
+            return Pressed(replace(controls, note=error.short))
     if key == "backspace":
         return Pressed(replace(controls, typed=typed[:-1]))
     if key == "escape":

@@ -33,8 +33,10 @@ LEAST_NEEDED = ("battery", "speed", "role", "set-point", "age", "east", "north")
 """Columns that a narrow terminal goes without, the first first."""
 WIDE = 100
 """Characters from which trust is drawn, and not only written."""
-FIXED, WORDS = 9, 3
-"""Lines round the vehicles' and the happenings', and lines that the latter have at least."""
+ROOMY, WORDS = 9, 3
+"""Lines round the vehicles' and the happenings', where there is room for all, and those that the latter have then."""
+LOW, BARRED = 16, 8
+"""Lines below which what happened gives way to vehicles, and below which the bar does."""
 NEWS_NS = 2_000_000_000
 """What happened so short a (recorded) time ago stands out."""
 _VEHICLE = re.compile(r"vehicle (\d+): (.*)")
@@ -48,10 +50,12 @@ class Screen:
         self._console, self._timeline, self._view, self._title = console, timeline, view, title
         self._live = Live(console=console, screen=True, auto_refresh=False)
         self._shown_ns = -REFRESH_NS
+        self._shown: tuple[Controls, tuple[int, int]] | None = None
+        """What the picture on the terminal was drawn from."""
 
     def enter(self) -> None:
         """Take the terminal, and draw at once."""
-        self._shown_ns = -REFRESH_NS
+        self._shown_ns, self._shown = -REFRESH_NS, None
         self._live.start()
 
     def leave(self) -> None:
@@ -59,12 +63,13 @@ class Screen:
         self._live.stop()
 
     def show(self, controls: Controls, now_ns: int, *, at_once: bool = False) -> None:
-        """If it is time, and if the terminal took the last picture."""
+        """If it is time, if anything is another than it was, and if the terminal took the last picture."""
         file = self._console.file
         if isinstance(file, Unblocked) and file.behind:
             return
-        if at_once or now_ns - self._shown_ns >= REFRESH_NS:
-            self._shown_ns = now_ns
+        shown = controls, self._console.size
+        if shown != self._shown and (at_once or now_ns - self._shown_ns >= REFRESH_NS):
+            self._shown_ns, self._shown = now_ns, shown
             self._live.update(self._picture(controls), refresh=True)
 
     def _picture(self, controls: Controls) -> Group:
@@ -74,31 +79,45 @@ class Screen:
 
 
 def picture(controls: Controls, timeline: Timeline, view: View, *, title: str, width: int, height: int) -> Group:
-    """As many lines as the terminal has, none longer than it is wide."""
-    player = controls.player
-    first, last = (f"{timeline.seconds(at_ns):.1f} s" for at_ns in (timeline.start_ns, timeline.end_ns))
-    line = max(width - len(first) - len(last) - 2, 1)
-    vehicles = _chosen(view.vehicles, max(height - FIXED - WORDS, 1))
-    room = max(height - FIXED - min(len(vehicles) + 1, len(view.vehicles)), 0)
-    news = list(_news(so_far(timeline.happenings, player.position_ns), player.position_ns, timeline))
+    """As many lines as the terminal has, none longer than it is wide.
+
+    The keys have one always; in a low terminal vehicles come before what happened, and that before empty lines.
+    """
+    roomy = height >= ROOMY + len(view.vehicles) + WORDS
+    above = _above(controls.player, timeline, view, title, width, roomy=roomy, barred=height >= BARRED)
+    room = max(height - len(above) - 2 - roomy, 0)
+    vehicles = _chosen(view.vehicles, max(room - (WORDS if height >= LOW else 0), 0))
+    table: list[RenderableType] = [_table(vehicles, of_flight=timeline.flight is not None, width=width)]
+    more = len(view.vehicles) - len(vehicles)
+    if more and room:
+        table.append(Text(f"and {more} more, for which this terminal has no line", style="dim italic"))
+    room -= len(vehicles) + len(table) - 1
+    news = list(_news(so_far(timeline.happenings, controls.player.position_ns), controls.player.position_ns, timeline))
     news = news[max(len(news) - room, 0) :]
-    lines: list[RenderableType] = [
-        _between(Text(title, style="bold"), Text(_utc(player.position_ns), style="dim"), width),
-        _between(_state(timeline, player, view), _motion(player), width),
-        Text(),
-        Text.assemble(first, " ", bar(timeline, player.position_ns, line), " ", last),
-        Text.assemble(" " * (len(first) + 1), marks(timeline, line)),
-        Text(),
-        _table(vehicles, len(view.vehicles), of_flight=timeline.flight is not None, width=width),
-        Text(),
-        *news,
-        *[Text()] * (room - len(news)),
-        _bottom(controls, width),
-    ]
+    lines = [*above, *table, *[Text()] * roomy, *news, *[Text()] * (room - len(news)), _bottom(controls, width)]
     for text in lines:
         if isinstance(text, Text):
             text.no_wrap, text.overflow = True, "ellipsis"
     return Group(*lines)
+
+
+def _above(
+    player: Player, timeline: Timeline, view: View, title: str, width: int, *, roomy: bool, barred: bool
+) -> list[RenderableType]:
+    """The lines above the vehicles. roomy: whether there is room for all;  barred: for the bar at least."""
+    state = _between(_state(timeline, player, view), _motion(player), width)
+    if not barred:
+        return [state]
+    first, last = (f"{timeline.seconds(at_ns):.1f} s" for at_ns in (timeline.start_ns, timeline.end_ns))
+    line = max(width - len(first) - len(last) - 2, 1)
+    bars = [
+        Text.assemble(first, " ", bar(timeline, player.position_ns, line), " ", last),
+        Text.assemble(" " * (len(first) + 1), marks(timeline, line)),
+    ]
+    if not roomy:
+        return [state, *bars]
+    head = _between(Text(title, style="bold"), Text(_utc(player.position_ns), style="dim"), width)
+    return [head, state, Text(), *bars, Text()]
 
 
 def _between(left: Text, right: Text, width: int) -> Text:
@@ -145,15 +164,11 @@ def _troubled(vehicle: Vehicle) -> bool:
     return vehicle.trust < DISTRUSTED or vehicle.system in vehicle.part.left_behind or silent
 
 
-def _table(vehicles: Sequence[Vehicle], count: int, *, of_flight: bool, width: int) -> Table:
+def _table(vehicles: Sequence[Vehicle], *, of_flight: bool, width: int) -> Table:
     headings = COLUMNS if of_flight else OF_FRAMES
     cells = [_cells(vehicle, drawn=width >= WIDE) for vehicle in vehicles]
     columns = {heading: [row[heading] for row in cells] for heading in headings}
-    table = fleet_table(columns, width=width, least_needed=LEAST_NEEDED)
-    if len(vehicles) < count:
-        table.caption = f"and {count - len(vehicles)} more, for which this terminal has no line"
-        table.caption_justify = "left"
-    return table
+    return fleet_table(columns, width=width, least_needed=LEAST_NEEDED)
 
 
 def _cells(vehicle: Vehicle, *, drawn: bool) -> dict[str, Text]:
@@ -220,6 +235,7 @@ def _bottom(controls: Controls, width: int) -> Text:
     text = Text()
     for key, what in HELP:
         more = Text.assemble("  " * bool(text), (key, "bold"), " ", (what, "dim"))
-        if text.cell_len + more.cell_len <= width:
-            text.append_text(more)
+        if text.cell_len + more.cell_len > width:
+            break
+        text.append_text(more)
     return text

@@ -25,10 +25,18 @@ from wire.ids import AUTOPILOT
 
 STEP_NS = 100_000_000
 """Between two steps through a recording without ticks."""
-TLOG = ".tlog"
 READ_S = 0.05
 """Times are shown to a tenth of a second: what is shown can be asked for."""
 _SECONDS = re.compile(r"(-?)(?:(\d+):(?=[0-5]?\d(?:\.|$)))?(\d+(?:\.\d*)?)")
+
+
+class NoSuchPlace(BadUsageError):
+    """Where somebody wants to go, and the recording has nothing of the kind."""
+
+    def __init__(self, short: str, more: str = "") -> None:
+        """short: what fits in a line of a screen;  more: the rest of the sentence."""
+        super().__init__(short + more)
+        self.short = short
 
 
 @dataclass(frozen=True)
@@ -87,7 +95,7 @@ class Timeline:
     def place(self, asked: str, option: str = "") -> int:
         """The position [ns] that somebody asks for: seconds (12.5, 1:05), or words of an event.
 
-        Raises BadUsageError, in a sentence that begins with the option, if any.
+        Raises NoSuchPlace, in a sentence that begins with the option, if any.
         """
         asked, option = asked.strip(), option and f"{option} "
         match = _SECONDS.fullmatch(asked)
@@ -96,15 +104,14 @@ class Timeline:
             since_s = (float(seconds) + 60 * int(minutes or 0)) * (-1 if sign else 1)
             first, last = (self.seconds(at) for at in (self.start_ns, self.end_ns))
             if not first - READ_S <= since_s <= last + READ_S:
-                raise BadUsageError(f"{option}{asked}: the recording goes from {first:.1f} s to {last:.1f} s")
+                raise NoSuchPlace(f"{option}{asked}: the recording goes from {first:.1f} s to {last:.1f} s")
             return self.origin_ns + round(since_s * 1e9)
         for happening in self.happenings:
             if asked and asked.casefold() in happening.words.casefold():
                 return happening.time_ns + 1
         told = [happening.words for happening in self.happenings if happening.kind is not Kind.WORD]
-        raise BadUsageError(
-            f"{option}{asked}: neither seconds (12.5, 1:05) nor words of an event; there are: {_listed(told)}"
-        )
+        short = f"{option}{asked}: neither seconds (12.5, 1:05) nor words of an event"
+        raise NoSuchPlace(short, f"; there are: {_listed(told)}")
 
 
 def _listed(words: Iterable[str]) -> str:
@@ -114,8 +121,6 @@ def _listed(words: Iterable[str]) -> str:
 def load(path: Path) -> Timeline:
     """Of a recording, or of the one in a run's folder. Raises UnreadableRecording."""
     path = located(path)
-    if path.suffix == TLOG:
-        raise UnreadableRecording(f"{path}: a log of frames; gcs log import makes a recording of it")
     with readable(path), path.open("rb") as stream:
         reader = SeekingReader(stream, validate_crcs=True, record_size_limit=RECORD_SIZE_LIMIT)
         summary = reader.get_summary()

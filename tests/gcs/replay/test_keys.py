@@ -134,6 +134,11 @@ def test_a_place_that_there_is_not_is_said_and_nothing_moves(flight, middle):
     assert after(lost, flight, "up").note == ""
 
 
+def test_words_that_are_of_no_event_are_said_to_be_so_in_a_line(flight, middle):
+    lost = after(middle, flight, "g", *"lunch", "enter")
+    assert lost.note == "lunch: neither seconds (12.5, 1:05) nor words of an event"
+
+
 def test_q_ends_it(flight, middle):
     assert after(middle, flight, "q").done
 

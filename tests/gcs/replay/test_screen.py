@@ -15,7 +15,7 @@ from gcs.replay.bar import MARKS, bar, marks
 from gcs.replay.controls import Controls
 from gcs.replay.player import Player
 from gcs.replay.reel import Reel
-from gcs.replay.screen import picture
+from gcs.replay.screen import Screen, picture
 from gcs.replay.view import OfFrames, OfTicks, View, seer
 
 SECOND = 1_000_000_000
@@ -115,12 +115,12 @@ def test_it_fits_whatever_the_terminal(flight, size, place):
     width, height = size
     lines = shown(flight, at(flight, place), width=width, height=height)
     assert max(len(line) for line in lines) <= width
-    if height >= 16:
-        assert len(lines) == height
-        assert lines[-1].startswith("space pause")
+    assert len(lines) == height
+    assert lines[-1].startswith("space pause")
+    assert len(rows(lines)) == 6 if height >= 12 else "more, for" in "\n".join(lines) or "…" in lines[-2]
 
 
-@pytest.mark.parametrize("height", [24, 16])
+@pytest.mark.parametrize("height", [24, 16, 12])
 def test_where_there_are_too_many_vehicles_those_with_trouble_have_a_line(flight, height):
     controls = at(flight, "10")
     one = OfTicks(flight.flight)(controls.player.position_ns).vehicles[0]
@@ -137,6 +137,31 @@ def test_what_is_typed_and_what_was_said_of_it_take_the_place_of_the_keys(flight
     controls = at(flight, "10")
     assert shown(flight, replace(controls, typed="1:0"))[-1].startswith("go to 1:0▏")
     assert shown(flight, replace(controls, note="999: the recording ends"))[-1] == "999: the recording ends"
+
+
+@pytest.mark.parametrize(
+    ("width", "keys"),
+    [
+        (40, "space pause  q quit  ←→ step  +− speed"),
+        (20, "space pause  q quit"),
+        (60, "space pause  q quit  ←→ step  +− speed  r reverse  n p event"),
+    ],
+)
+def test_the_keys_that_fit_are_told_the_most_needed_first(flight, width, keys):
+    assert shown(flight, at(flight, "10"), width=width, height=12)[-1] == keys
+
+
+def test_what_has_not_changed_is_not_drawn_again(flight):
+    console = Console(file=StringIO(), force_terminal=True, width=80, height=24)
+    screen = Screen(console, flight, OfTicks(flight.flight), "emergency")
+    paused = at(flight, "10", paused=True)
+    drawn = []
+    screen.enter()
+    for tenth, controls in enumerate((paused, paused, paused, replace(paused, note="there is no event after this"))):
+        screen.show(controls, tenth * SECOND)
+        drawn.append(len(console.file.getvalue()))
+    screen.leave()
+    assert drawn[0] == drawn[1] == drawn[2] < drawn[3]
 
 
 def test_at_the_very_beginning_nothing_is_known_of_anybody(flight):
