@@ -33,23 +33,26 @@ class Filling:
         """Channel → how many messages of it."""
         return {channel: len(entries) // 2 for channel, entries in self._indexes.items()}
 
-    def define(self, record: Any) -> None:
-        """A schema or a channel, ahead of the first message that needs it."""
-        data = packed(record)
+    def define(self, *those: Any) -> None:
+        """Schemas and channels, ahead of the first message that needs them."""
+        data = packed(*those)
         self._pieces.append(data)
         self.size += len(data)
 
     def extend(self, messages: Iterable[tuple[int, int, bytes]]) -> None:
-        """Each is (channel, time, payload)."""
+        """Each is (channel, time, payload). One that is none raises; those before it stay, it leaves nothing."""
         pieces, indexes, size = self._pieces, self._indexes, self.size
-        for channel, time_ns, data in messages:
-            index = indexes.get(channel)
-            if index is None:
-                index = indexes[channel] = []
-            index += (time_ns, size)
-            pieces += (_MESSAGE.pack(_OPCODE, _HEAD + len(data), channel, 0, time_ns, time_ns), data)
-            size += _MESSAGE.size + len(data)
-        self.size = size
+        try:
+            for channel, time_ns, data in messages:
+                head = _MESSAGE.pack(_OPCODE, _HEAD + len(data), channel, 0, time_ns, time_ns)
+                index = indexes.get(channel)
+                if index is None:
+                    index = indexes[channel] = []
+                index += (time_ns, size)
+                pieces += (head, data)
+                size += _MESSAGE.size + len(data)
+        finally:
+            self.size = size
 
     def packed(self, start: int) -> tuple[bytes, records.ChunkIndex]:
         """Itself and the indexes of its messages, as they are on the disk from `start` on, and what tells of them."""

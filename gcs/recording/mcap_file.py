@@ -41,6 +41,8 @@ class McapFile:
         self._file = path.open("wb", buffering=0)
         self._end = 0
         """Of the last whole record on the disk."""
+        self._torn = False
+        """Whether half a record may stand behind it."""
         self.dropped = 0
         """Messages that the disk did not take."""
         self._schemas: list[records.Schema] = []
@@ -128,11 +130,11 @@ class McapFile:
         counts = self._filling.counts
         if not counts:
             return
-        chunk, index = self._filling.packed(self._end)
-        self._filling = Filling()
+        filling, self._filling = self._filling, Filling()
         try:
+            chunk, index = filling.packed(self._end)
             self._write(chunk)
-        except OSError:
+        except Exception:
             self.dropped += sum(counts.values())
             schemas, channels = self._defined
             del self._schemas[schemas:], self._channels[channels:]
@@ -141,6 +143,9 @@ class McapFile:
         self._defined = len(self._schemas), len(self._channels)
         for channel, count in counts.items():
             self._counts[channel] = self._counts.get(channel, 0) + count
+        if self._end - self._told_at >= TOLD_AGAIN_BYTES:
+            self._told_at = self._end
+            self._filling.define(*self._schemas, *self._channels)
 
     def finish(self) -> None:
         """Write the summary and close. Raises OSError: then it may be tried again."""
@@ -190,13 +195,20 @@ class McapFile:
 
     def _write(self, data: bytes) -> None:
         """All of it, or none. Raises OSError."""
-        rest = memoryview(data)
+        if self._torn:
+            self._cut()
+        rest, self._torn = memoryview(data), True
         try:
             while rest:
                 rest = rest[self._file.write(rest) :]
         except OSError:
-            with suppress(OSError):  # of a disk that is gone there is nothing to be saved
-                self._file.truncate(self._end)
-                self._file.seek(self._end)
+            with suppress(OSError):  # or before the next record
+                self._cut()
             raise
         self._end += len(data)
+        self._torn = False
+
+    def _cut(self) -> None:
+        self._file.truncate(self._end)
+        self._file.seek(self._end)
+        self._torn = False

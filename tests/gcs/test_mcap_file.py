@@ -2,6 +2,7 @@
 
 import hashlib
 import io
+import struct
 from pathlib import Path
 
 import pytest
@@ -11,11 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mcap.exceptions import EndOfFile
 from mcap.reader import SeekingReader
-from mcap.records import Chunk, Message, SummaryOffset
-from mcap.stream_reader import StreamReader
+from mcap.records import Channel, Chunk, Message, SummaryOffset
+from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import CompressionType, Writer
 
-from gcs.recording.mcap_file import McapFile
+from gcs.recording.mcap_file import TOLD_AGAIN_BYTES, McapFile
 
 TOPICS = ("/a", "/b", "/ü")
 MESSAGES = st.tuples(st.sampled_from(range(len(TOPICS))), st.integers(0, 2**63), st.binary(max_size=40))
@@ -227,3 +228,77 @@ def test_an_error_in_its_block_leaves_what_was_flushed_and_no_summary(paths):
     with pytest.raises(ZeroDivisionError):
         failing_behind_a_flush(path)
     assert list(prefix(path.read_bytes())) == [b"kept"]
+
+
+class Untruncatable:
+    """The file beneath, of which for a while nothing can be cut off, as on a disk that answers nothing."""
+
+    def __init__(self, file):
+        self._file = file
+        self.answers = False
+
+    def truncate(self, size):
+        if not self.answers:
+            raise OSError("Input/output error")
+        return self._file.truncate(size)
+
+    def __getattr__(self, name):
+        return getattr(self._file, name)
+
+
+def test_what_could_not_be_cut_off_at_once_is_cut_off_before_anything_is_written_behind_it(paths):
+    path, _ = paths
+    file, channel = file_of(path, 3)
+    before = path.read_bytes()
+    file._file = disk = Untruncatable(file._file)
+    with Limited(len(before) + 60):
+        file.add(channel, 4, random(4))
+        with pytest.raises(OSError, match="File too large"):
+            file.flush()
+        with pytest.raises(OSError, match="Input/output error"):
+            file.finish()
+    assert path.stat().st_size == len(before) + 60
+    disk.answers = True
+    file.finish()
+    assert path.read_bytes().startswith(before)
+    assert [message.data for _, _, message in reader(path.read_bytes()).iter_messages()] == [
+        random(number) for number in range(3)
+    ]
+
+
+@pytest.mark.parametrize("wrong", [(1, -1, b"before 1970"), (1, 5, None), (-1, 5, b"no channel")], ids=str)
+def test_a_message_that_is_none_raises_and_leaves_a_whole_file_without_it(paths, wrong):
+    path, _ = paths
+    file, channel = file_of(path, 2)
+    with pytest.raises((TypeError, struct.error)):
+        file.extend([(channel, 2, random(2)), wrong])
+    file.add(channel, 3, random(3))
+    file.finish()
+    assert [message.data for _, _, message in reader(path.read_bytes()).iter_messages()] == [
+        random(number) for number in range(4)
+    ]
+
+
+def test_a_chunk_that_cannot_be_packed_is_left_out_and_the_file_is_finished_all_the_same(paths):
+    path, _ = paths
+    file, channel = file_of(path, 2)
+    file.add(channel, 2, "no bytes")
+    with pytest.raises(TypeError):
+        file.flush()
+    assert file.dropped == 1
+    file.finish()
+    assert reader(path.read_bytes()).get_summary().statistics.message_count == 2
+
+
+def test_a_chunk_that_is_damaged_takes_no_topics_name_along_for_long(paths):
+    path, _ = paths
+    file = McapFile(path)
+    channels = [file.channel(topic, "json", file.schema("S", "jsonschema", b"{}")) for topic in TOPICS]
+    while path.stat().st_size < 2.2 * TOLD_AGAIN_BYTES:
+        file.extend((channel, 1, random(number)) for number in range(300) for channel in channels)
+        file.flush()
+    file.finish()
+    told = [[record.topic for record in breakup_chunk(chunk) if isinstance(record, Channel)]
+            for chunk in chunks(path.read_bytes())]  # fmt: skip
+    assert [topics for topics in told if topics] == [list(TOPICS)] * 3
+    assert len(told) > 10
