@@ -101,6 +101,11 @@ def robots(systems: Sequence[int]) -> str:
     return f"{'robot' if len(systems) == 1 else 'robots'} {', '.join(map(str, systems))}"
 
 
+def missing(count: int, what: str) -> str:
+    """1 message is missing; 2 messages are missing."""
+    return f"{count} {what} is missing" if count == 1 else f"{count} {what}s are missing"
+
+
 @dataclass(frozen=True, slots=True)
 class Ending:
     """How a flight ended, as everything that shows it calls it."""

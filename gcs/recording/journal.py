@@ -15,7 +15,11 @@ from types import TracebackType
 from gcs.loop import Clock, Link
 from gcs.recording.files import RecordingError
 from gcs.recording.tlog import packed
+from gcs.words import missing
 from wire.frames import Frame
+
+SURE_NS = 1_000_000_000
+"""So long it must miss nothing before it is said to go on: on a disk that fills up, short frames still fit at times."""
 
 
 class Journal:
@@ -29,11 +33,13 @@ class Journal:
         self._torn = False
         """Whether half an entry may stand behind it."""
         self._failing = False
+        self._missed_ns = 0
+        """When the last frame came that is missing."""
         self._why: str | None = None
         self.missing = 0
         """Frames that the disk did not take."""
         try:
-            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND, 0o666)
+            self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o666)
         except OSError as error:
             raise RecordingError(f"{path}: the journal cannot be written: {error.strerror or error}") from None
 
@@ -49,7 +55,7 @@ class Journal:
     @property
     def problem(self) -> str | None:
         """Why frames are missing, if any are."""
-        return None if self._why is None else f"{self._path}: {self.missing} frames are missing: {self._why}"
+        return None if self._why is None else f"{self._path}: {missing(self.missing, 'frame')}: {self._why}"
 
     def arrived(self, frame: Frame) -> None:
         """One that came, under its time of arrival."""
@@ -60,11 +66,12 @@ class Journal:
         try:
             self._write(packed(time_ns, frame))
         except OSError as error:
+            self._missed_ns = time_ns
             self._missed(error)
         else:
-            if self._failing:
+            if self._failing and time_ns - self._missed_ns >= SURE_NS:
                 self._failing = False
-                self._say(f"gcs: {self._path}: the journal goes on; {self.missing} frames are missing")
+                self._say(f"gcs: {self._path}: the journal goes on; {missing(self.missing, 'frame')}")
 
     def _write(self, entry: bytes) -> None:
         """All of it, or none. Raises OSError."""

@@ -1,5 +1,8 @@
 """A journal holds every frame of a flight in whole entries, each before it goes, and stops nothing when it cannot."""
 
+import os
+from pathlib import Path
+
 import pytest
 from disks import Limited
 from flights import SHORT, Arriving, Counting, Saying, failing, fly_and_record, messages, scratch
@@ -15,7 +18,7 @@ from scenarios import load
 from wire.frames import Sender
 from wire.payloads import LOCAL_POSITION_NED
 
-NOW_NS = 1_600_000_000_123_456_789
+NOW_NS, SECOND_NS = 1_600_000_000_123_456_789, 1_000_000_000
 
 
 def silent(words):
@@ -118,16 +121,36 @@ def test_whatever_fits_is_noted_whole_and_the_rest_is_counted(rounds):
 def test_it_says_when_it_goes_on_and_what_it_lacks(tmp_path):
     said, path = [], tmp_path / "run.tlog"
     with Journal(path, said.append) as journal:
-        for number in range(9):
+        for number in range(12):
             with Limited(70 if 3 <= number < 6 else 1000):
-                journal.note(NOW_NS, frame(number))
-    assert [entry.raw for entry in entries(path)] == [frame(number) for number in (0, 1, 2, 6, 7, 8)]
+                journal.note(NOW_NS + number * SECOND_NS // 4, frame(number))
+            if number == 8:
+                assert len(said) == 1
+    assert [entry.raw for entry in entries(path)] == [frame(number) for number in (0, 1, 2, *range(6, 12))]
     assert said[1:] == [f"gcs: {path}: the journal goes on; 3 frames are missing"]
 
 
-def test_a_place_where_none_can_be_is_refused_in_a_sentence(tmp_path):
-    (tmp_path / "run.tlog").mkdir()
-    with pytest.raises(RecordingError, match=r"run\.tlog: the journal cannot be written: Is a directory$"):
+def test_it_does_not_say_so_each_time_that_a_short_frame_still_fits(tmp_path):
+    said, path = [], tmp_path / "run.tlog"
+    with Journal(path, said.append) as journal:
+        for number in range(40):
+            with Limited(0 if number % 2 else 1000):
+                journal.note(NOW_NS + number * SECOND_NS // 10, frame(number))
+    assert [words.split(": ")[2] for words in said] == ["the journal misses frames"]
+    assert journal.problem.startswith(f"{path}: 20 frames are missing: ")
+
+
+def test_one_frame_that_is_missing_is_one(tmp_path):
+    with Journal(tmp_path / "run.tlog", str) as journal, Limited(0):
+        journal.note(NOW_NS, frame(1))
+    assert journal.problem == f"{tmp_path}/run.tlog: 1 frame is missing: File too large"
+
+
+@pytest.mark.parametrize("make", [Path.mkdir, os.mkfifo, Path.touch], ids=["folder", "pipe", "file"])
+def test_it_takes_nobodys_place(tmp_path, make):
+    """Nor waits for anybody to read from a pipe."""
+    make(tmp_path / "run.tlog")
+    with pytest.raises(RecordingError, match=r"run\.tlog: the journal cannot be written: File exists$"):
         Journal(tmp_path / "run.tlog", silent)
 
 
