@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from itertools import pairwise
@@ -11,9 +11,11 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from gcs.events import Event, Rating
 from gcs.flight_state import Phase
 from gcs.gate import LOST_NS
 from gcs.recording import sentences
+from gcs.recording.faults import FaultSpan
 from gcs.scoring import DISTRUSTED
 from gcs.track import Parts
 
@@ -35,8 +37,10 @@ class Kind(Enum):
     """The truth of a simulation, which no flight knew; never shown to participants of a study."""
     LINK = "link"
     """A vehicle fell silent, or is heard again."""
+    HANDS = "hands"
+    """A vehicle is not ours any more, or is ours again."""
     WORD = "word"
-    """Of the operator, or of an autopilot."""
+    """Of the operator, or of an autopilot: a refusal, too."""
     PROBLEM = "problem"
 
 
@@ -55,21 +59,6 @@ class Happening:
     words: str
 
 
-@dataclass(frozen=True, slots=True)
-class FaultSpan:
-    """While a fault acted, where it is known that it did (`History.faults_by`)."""
-
-    vehicle: int | None
-    """Who is blamed; None of what strikes everyone."""
-    kind: str
-    from_s: float
-    """Since mission start."""
-    to_s: float
-    """Infinite where it never ended."""
-    words: str
-    """What goes wrong, as the summary has it."""
-
-
 Found = tuple[int, Kind, int | None, str]
 """Row of the arrays, what it is about, system id or None, words."""
 
@@ -84,6 +73,21 @@ def phases(phase: Sequence[str], task: Sequence[str]) -> Iterator[Found]:
         elif now[1] != before[1]:
             yield row, Kind.PHASE, None, sentences.next_task(now[1])
         before = now
+
+
+def operators_words(said: Iterable[tuple[int, Event]]) -> Iterator[Found]:
+    """(row, word) each."""
+    return ((row, Kind.WORD, None, sentences.operator(word)) for row, word in said)
+
+
+def vehicles_words(said: Iterable[tuple[int, int, str]]) -> Iterator[Found]:
+    """(row, system id, words) each."""
+    return ((row, Kind.WORD, system, sentences.vehicle(system, text)) for row, system, text in said)
+
+
+def ratings(said: Iterable[tuple[int, Rating]]) -> Iterator[Found]:
+    """(row, rating) each."""
+    return ((row, Kind.RATING, rating.vehicle, sentences.rating(rating)) for row, rating in said)
 
 
 def distrust(trust: Array, ids: Sequence[int]) -> Iterator[Found]:
@@ -119,6 +123,14 @@ def faults(spans: Sequence[FaultSpan], mission_s: Array) -> Iterator[Found]:
         yield row_at(mission_s, span.from_s), Kind.FAULT, span.vehicle, f"a fault begins: {span.words}"
         if math.isfinite(span.to_s):
             yield row_at(mission_s, span.to_s), Kind.FAULT, span.vehicle, f"a fault ends: {span.words}"
+
+
+def ordered(found: Iterable[Found]) -> list[Found]:
+    """By their rows, and of one row causes first: a fault begins behind the phase that it begins in, and before what
+    followed from it; all else stays in its order.
+    """
+    late = {Kind.FAULT: 1, Kind.DISTRUST: 2, Kind.ROLES: 2}
+    return sorted(found, key=lambda one: (one[0], late.get(one[1], 0)))
 
 
 def row_at(times: Array | npt.NDArray[np.int64], time: float) -> int:

@@ -15,6 +15,8 @@ import numpy.typing as npt
 import orjson
 
 from gcs.messages import HEARTBEAT, STATUSTEXT
+from gcs.recording import said
+from gcs.recording.happenings import Kind
 from gcs.recording.reader import Message
 from gcs.telemetry import Swarm, observe
 from wire.frames import MAGIC_1, Framer
@@ -35,6 +37,29 @@ TELLING = tuple(number.to_bytes(3, "little") for number in (HEARTBEAT, STATUSTEX
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Links:
+    """How vehicles were heard over the flight, where the link told: L moments."""
+
+    time_ns: Integers
+    """(L,)"""
+    received: Integers
+    """(L, N) frames since the vehicle was first heard."""
+    lost: Integers
+    """(L, N)"""
+
+    @staticmethod
+    def of(told: Told, times: Mapping[int, int]) -> Links | None:
+        """Of /link. times: tick → when it was told [ns]"""
+        if not told:
+            return None
+        ticks = sorted(told)
+        received, lost = (
+            np.array([told[tick][key] for tick in ticks]).astype(np.int64) for key in ("received", "lost")
+        )
+        return Links(np.array([times[tick] for tick in ticks], np.int64), received, lost)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Heard:
     """A recording's messages, sorted."""
 
@@ -47,7 +72,9 @@ class Heard:
     events: Mapping[str, Sequence[dict[str, Any]]]
     """Topic → what it told, in order."""
     spoken: Sequence[tuple[int, int, str]]
-    """(time of arrival [ns], system id, what its autopilot said)."""
+    """(tick that took it in, system id, what its autopilot said)."""
+    log: Sequence[tuple[int, Kind, int | None, str]]
+    """(time [ns], what it is about, system id if any, sentence) of /log, in order; empty in older recordings."""
     autopilot: Integers
     """(N,) MAV_AUTOPILOT of the heartbeats; 0 where none came."""
 
@@ -56,12 +83,16 @@ class Heard:
         """All messages of a recording, in its order."""
         topics, events = defaultdict[str, Told](dict), defaultdict[str, list[dict[str, Any]]](list)
         times, link_times, spoken = dict[int, int](), dict[int, int](), list[tuple[int, int, str]]()
+        words = list[tuple[int, str]]()
+        log = list[tuple[int, Kind, int | None, str]]()
         framer, swarm = Framer(), Swarm.of(range(1, vehicles + 1))
         for topic, encoding, time_ns, data in messages:
             if encoding == "mavlink":
                 if data[7:10] in TELLING or data[0] == MAGIC_1:
                     swarm = observe(swarm, framer.frames(time_ns, data))
-                    spoken += ((time_ns, system, text) for system, _severity, text in swarm.words)
+                    words += ((system, text) for system, _severity, text in swarm.words)
+            elif topic == "/log":
+                log.append((time_ns, *said.read(data)))
             elif topic in AS_THEY_HAPPEN:
                 events[topic].append(orjson.loads(data))
             elif encoding == "json" and topic.startswith(TICK_BY_TICK):
@@ -70,9 +101,11 @@ class Heard:
                 topics[topic][number] = {key: _numbers(told[key]) if key in ARRAYS else told[key] for key in told}
                 if topic == "/tick":
                     times[number] = time_ns
+                    spoken += ((number, system, text) for system, text in words)
+                    words.clear()
                 elif topic == "/link":
                     link_times[number] = time_ns
-        return Heard(topics, times, link_times, events, spoken, swarm.autopilot)
+        return Heard(topics, times, link_times, events, spoken, log, swarm.autopilot)
 
 
 def _numbers(value: Any) -> Array | None:

@@ -7,23 +7,22 @@ nothing was told.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import chain
+from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from gcs import words
 from gcs.events import Rating
 from gcs.flight_state import Phase
 from gcs.recording import happenings as find
-from gcs.recording import sentences
-from gcs.recording.files import FAULTS, MADE, METADATA
-from gcs.recording.happenings import FaultSpan, Found, Happening, Kind
-from gcs.recording.heard import Heard, Told, column, held
+from gcs.recording.faults import FaultsBy, FaultSpan, faults_by, spans
+from gcs.recording.files import METADATA
+from gcs.recording.happenings import Found, Happening, Kind
+from gcs.recording.heard import Heard, Links, Told, column, held
 from gcs.recording.reader import (
     CUT_SHORT,
     Recording,
@@ -35,7 +34,8 @@ from gcs.recording.reader import (
     track_of,
 )
 from gcs.recording.recovery import RECOVERED
-from gcs.scoring import struck
+from gcs.scoring import min_separation, separation, struck
+from gcs.summary import collision, trust_of
 from gcs.track import Parts, Track
 from scenarios import Scenario
 
@@ -44,19 +44,6 @@ __all__ = ["FaultSpan", "FaultsBy", "Happening", "History", "Kind", "Links", "lo
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 Integers = npt.NDArray[np.int64]
-FaultsBy = Literal["made", "planned", "unknown"]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Links:
-    """How vehicles were heard over the flight, where the link told: L moments."""
-
-    time_ns: Integers
-    """(L,)"""
-    received: Integers
-    """(L, N) frames since the vehicle was first heard."""
-    lost: Integers
-    """(L, N)"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,9 +122,7 @@ class History:
     autopilot: Integers
     """(N,) MAV_AUTOPILOT of the heartbeats; 0 where none came."""
     faults_by: FaultsBy = "made"
-    """Whence it is known what was wrong: "made" by the one who flew it, in simulation or on the link; "planned" by the
-    scenario, of a simulation behind a link that is taken to fly the same; "unknown" where vehicles told no truth.
-    """
+    """Whence it is known what was wrong."""
 
     @property
     def acted(self) -> tuple[FaultSpan, ...]:
@@ -177,7 +162,7 @@ def _history(path: Path, recording: Recording, heard: Heard) -> History:
     truth = column(told["/truth/pose"], "position_m", number, n, 3)
     commanded = column(setpoint, "commanded", number, n) > 0.0
     parts = tuple(map(parts_of, heard.events["/roles"]))
-    faults_by = _faults_by(recording.metadata[METADATA], measured=not told["/truth/pose"])
+    known_by = faults_by(recording.metadata[METADATA], measured=not told["/truth/pose"])
     return History(
         path=path,
         scenario=scenario,
@@ -209,24 +194,15 @@ def _history(path: Path, recording: Recording, heard: Heard) -> History:
         virtual_velocity_ne=_pair(mission, "velocity_north_m_s", "velocity_east_m_s", number),
         ratings=tuple(map(rating_of, heard.events["/ratings"])),
         parts=parts,
-        faults=() if faults_by == "unknown" else tuple(_spans(heard.events["/truth/fault"], scenario)),
+        faults=() if known_by == "unknown" else tuple(spans(heard.events["/truth/fault"], scenario)),
         happenings=(),
-        links=_links(told["/link"], heard.link_times),
+        links=Links.of(told["/link"], heard.link_times),
         track=track_of(recording, told, parts),
         summary=recording.summary,
         recovered=recording.metadata.get(RECOVERED),
         autopilot=heard.autopilot,
-        faults_by=faults_by,
+        faults_by=known_by,
     )
-
-
-def _faults_by(metadata: Mapping[str, str], *, measured: bool) -> FaultsBy:
-    """Older recordings do not say: those of a simulation of ours have a seed."""
-    if FAULTS in metadata and metadata[FAULTS] == MADE:
-        return "made"
-    if measured:
-        return "unknown"
-    return "made" if FAULTS not in metadata and metadata.get("seed") else "planned"
 
 
 def _pair(told: Told, north: str, east: str, number: Integers) -> Array:
@@ -237,65 +213,45 @@ def _integers(values: Array, untold: int) -> Integers:
     return np.nan_to_num(values, nan=untold).astype(np.int64)
 
 
-def _spans(told: Sequence[Mapping[str, Any]], scenario: Scenario) -> Iterator[FaultSpan]:
-    """Each fault from its begin to its end, in the order in which they began."""
-    names = list(zip((fault.model_dump() for fault in scenario.fault), words.faults(scenario), strict=True))
-    for at, begin in enumerate(told):
-        if not begin["active"]:
-            continue
-        definition = begin["definition"]
-        ends = (e["mission_s"] for e in told[at + 1 :] if e["definition"] == definition and not e["active"])
-        said = next((name for known, name in names if known == definition), begin["kind"].replace("_", " "))
-        blamed = None if definition.get("everyone") else begin["vehicle"]
-        yield FaultSpan(blamed, begin["kind"], begin["mission_s"], next(ends, math.inf), said)
-
-
-def _links(told: Told, times: Mapping[int, int]) -> Links | None:
-    if not told:
-        return None
-    ticks = sorted(told)
-    received, lost = (np.array([told[tick][key] for tick in ticks]).astype(np.int64) for key in ("received", "lost"))
-    return Links(np.array([times[tick] for tick in ticks], np.int64), received, lost)
-
-
 def _happenings(history: History, heard: Heard) -> Iterator[Happening]:
-    """All of them, in the order of time."""
-    mission_s, ids = history.mission_s, history.ids
-    found = chain(
-        find.phases(history.phase, history.task),
-        find.faults(history.faults, mission_s),
-        _ratings(heard, history.number),
-        _words(history, heard),
-        find.distrust(history.trust, ids),
-        find.roles(history.parts, mission_s),
-        find.silences(history.age_s, ids),
-        _problem(history),
-    )
-    for row, kind, vehicle, said in sorted(found, key=lambda one: one[0]):
-        yield Happening(int(history.time_ns[row]), row, float(mission_s[row]), kind, vehicle, said)
+    """All of them, in the order of time: as /log has them, or else as they show; the truth and the end beside it."""
+    row_at = partial(find.row_at, history.time_ns)
+    logged = [(row_at(time_ns), kind, vehicle, said) for time_ns, kind, vehicle, said in heard.log]
+    found = logged or list(_shown(history, heard))
+    found += find.faults(history.faults, history.mission_s)
+    if history.problem is not None and not any(history.problem == said for *_, said in found):
+        found.append((_turned(history, logged=bool(logged)), Kind.PROBLEM, None, history.problem))
+    for row, kind, vehicle, said in find.ordered(found):
+        yield Happening(int(history.time_ns[row]), row, float(history.mission_s[row]), kind, vehicle, said)
 
 
-def _ratings(heard: Heard, number: Integers) -> Iterator[Found]:
-    for content in heard.events["/ratings"]:
-        said = rating_of(content)
-        yield find.row_at(number, content["tick"]), Kind.RATING, said.vehicle, sentences.rating(said)
+def _shown(history: History, heard: Heard) -> Iterator[Found]:
+    """What /log would have, of a recording that is older than it, in its order; who flies whom was not told then."""
+    number, ids = history.number, history.ids
+    ratings = ((find.row_at(number, content["tick"]), rating_of(content)) for content in heard.events["/ratings"])
+    turns = ((row, heard.topics["/tick"][tick]["events"]) for row, tick in enumerate(number.tolist()))
+    yield from find.operators_words((row, event) for row, events in turns for event in events)
+    yield from find.ratings(ratings)
+    yield from find.vehicles_words((find.row_at(number, tick), system, text) for tick, system, text in heard.spoken)
+    yield from find.silences(history.age_s, ids)
+    yield from find.phases(history.phase, history.task)
+    if trust_of(history.scenario) is not None:
+        flying = np.array([phase == Phase.MISSION.value for phase in history.phase])
+        yield from find.distrust(np.where(flying[:, None], history.trust, np.nan), ids)
+    yield from find.roles(history.parts, history.mission_s)
 
 
-def _words(history: History, heard: Heard) -> Iterator[Found]:
-    """Of the operator, and of autopilots."""
-    for row, tick in enumerate(history.number.tolist()):
-        for event in heard.topics["/tick"][tick]["events"]:
-            yield row, Kind.WORD, None, sentences.operator(event)
-    for time_ns, system, text in heard.spoken:
-        yield find.row_at(history.time_ns, time_ns), Kind.WORD, system, sentences.vehicle(system, text)
+def _turned(history: History, *, logged: bool) -> int:
+    """The row of a problem that /log does not have: where two vehicles touched, or the flight turned to its end.
 
-
-def _problem(history: History) -> Iterator[Found]:
-    """Where the flight turned to its end because of it."""
-    if history.problem is not None:
-        last = len(history.phase) - 1
-        turned = (row for row, phase in enumerate(history.phase) if phase in ENDS)
-        yield last if history.problem == CUT_SHORT else next(turned, last), Kind.PROBLEM, None, history.problem
+    What the flight did not know of, as a disk that was full, stands at its last row.
+    """
+    last, track = len(history.phase) - 1, history.track
+    if track is not None and history.problem == collision(min_separation(track.position)):
+        return find.row_at(history.mission_s, float(track.time_s[separation(track.position).argmin()]))
+    if logged or history.problem == CUT_SHORT:
+        return last
+    return next((row for row, phase in enumerate(history.phase) if phase in ENDS), last)
 
 
 ENDS = (Phase.HOLD.value, Phase.LAND.value, Phase.DONE.value)

@@ -72,7 +72,7 @@ class Sayings:
             if answer.refused:
                 yield Kind.WORD, answer.system, Log.WARNING, answer.words
         for system, words in sentences.hands(swarm.ids, self._released, released):
-            yield Kind.LINK, system, Log.WARNING, words
+            yield Kind.HANDS, system, Log.WARNING, words
         self._released = released
 
     def _silence(self, tick: Tick) -> Iterator[Said]:
@@ -109,6 +109,16 @@ class Sayings:
         elif task != self._task:
             yield Kind.PHASE, None, Log.INFO, sentences.next_task(task)
         self._phase, self._task, self._problem = diagnosis.phase, task, problem
+
+
+KINDS = {kind.value: kind for kind in Kind}
+
+
+def read(data: bytes) -> tuple[Kind, int | None, str]:
+    """What a message of /log is about, which vehicle (system id) if any, and the sentence."""
+    said = Log.FromString(data)
+    kind, _, whom = said.name.partition("/")
+    return KINDS[kind], int(whom.removeprefix("uav_")) if whom else None, said.message
 
 
 def _differing(ids: Iterable[int], before: list[bool], now: list[bool]) -> Iterator[tuple[int, bool]]:

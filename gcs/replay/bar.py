@@ -14,6 +14,7 @@ MARKS = {
     Kind.DISTRUST: ("D", "bold red"),
     Kind.FAULT: ("F", "magenta"),
     Kind.LINK: ("L", "yellow"),
+    Kind.HANDS: ("H", "yellow"),
     Kind.ROLES: ("R", "yellow"),
     Kind.RATING: ("r", "blue"),
     Kind.PHASE: ("P", "cyan"),
@@ -27,9 +28,9 @@ def bar(timeline: Timeline, position_ns: int, width: int) -> Text:
     cells = [("━", "cyan")] * width
     here = _cell(timeline, position_ns, width)
     cells[here:] = [("─", "dim")] * (width - here)
-    for gap in sorted(timeline.gaps, key=lambda gap: gap.vehicle is None):
-        first, last = (_cell(timeline, at_ns, width) for at_ns in (gap.begin_ns, gap.end_ns))
-        cells[first : last + 1] = [(" ", "") if gap.vehicle is None else ("╌", "yellow")] * (last + 1 - first)
+    for silence in sorted(timeline.silences, key=lambda silence: silence.vehicle is None):
+        first, last = (_cell(timeline, at_ns, width) for at_ns in (silence.begin_ns, silence.end_ns))
+        cells[first : last + 1] = [(" ", "") if silence.vehicle is None else ("╌", "yellow")] * (last + 1 - first)
     cells[here] = ("●", "bold")
     return Text.assemble(*cells)
 

@@ -119,7 +119,7 @@ def test_robots_that_touch_end_in_a_problem(gcs, tmp_path):
     code, out, err = gcs("run", "demo", *BRIEFLY, *crowded, "--out", tmp_path)
     assert code == 3
     assert "their rotors would have touched" in err
-    assert out.splitlines()[1].startswith("failed")
+    assert out.splitlines()[1].startswith("not completed")
 
 
 REFUSED = [

@@ -17,7 +17,7 @@ from gcs.mission import plan
 from gcs.recording.happenings import FaultSpan, distrust, phases, row_at, silences
 from gcs.recording.history import Kind, load
 from gcs.recording.reader import CUT_SHORT, UnreadableRecording, read
-from gcs.scoring import score
+from gcs.scoring import score, separation
 from scenarios import load as load_scenario
 from wire.ids import TRUTH
 
@@ -229,9 +229,59 @@ def test_a_vehicle_that_falls_silent_is_told_and_when_it_is_heard_again(much):
     assert heard_s == pytest.approx(15.6, abs=0.21)
 
 
-def test_happenings_are_in_the_order_of_time(much):
+def test_a_vehicle_that_is_not_ours_any_more_is_told(much):
+    ((row, said),) = words(much, Kind.HANDS)
+    assert said == "vehicle 3 is not ours any more: nothing is sent to it"
+    assert row >= words(much, Kind.LINK)[0][0]
+
+
+def test_happenings_are_in_the_order_of_time_and_of_one_tick_causes_come_first(much, history):
     rows = [happening.tick for happening in much.happenings]
     assert rows == sorted(rows)
+    for told_of, first, then in (
+        (much, "the operator says: land", "landing"),
+        (much, "op2 rates robot 5 1 of 5: complete distrust", "robot 5 is distrusted"),
+        (history, "mission: parking lot inspection", "a fault begins: robot 5 at 40% speed"),
+        (history, "a fault begins: robot 5 at 40% speed", "robot 5 is distrusted"),
+    ):
+        said = [happening.words for happening in told_of.happenings]
+        before, after = said.index(first), said.index(then)
+        assert told_of.happenings[before].tick == told_of.happenings[after].tick
+        assert before < after
+
+
+def account(history):
+    """What happened, but for what only /log tells: who flies whom, and when the flight knew of its problem."""
+    told_by_log = (Kind.HANDS, Kind.PROBLEM)
+    return [(one.tick, one.kind, one.vehicle, one.words) for one in history.happenings if one.kind not in told_by_log]
+
+
+def without_log(path):
+    return rewritten(path, lambda _at, topic, _time_ns, data: None if topic == "/log" else data)
+
+
+def test_a_recording_that_is_older_than_the_log_has_the_same_happenings(much, history):
+    for told_of in (much, history):
+        older = load(without_log(told_of.path))
+        assert account(older) == account(told_of)
+        assert [text for _, text in words(older, Kind.PROBLEM)] == [text for _, text in words(told_of, Kind.PROBLEM)]
+
+
+def test_a_problem_stands_where_the_flight_knew_of_it_and_touching_where_it_was_closest(much):
+    ((row, text),) = words(much, Kind.PROBLEM)
+    assert (much.phase[row], text) == ("mission", "vehicle 3 fell silent 3.6 s into the mission")
+    crowded = fly_and_record("demo", *SHORT, "swarm.spacing_m=0.7", "control.separation_gain=0")
+    history = load(crowded.path)
+    ((row, text),) = words(history, Kind.PROBLEM)
+    assert text == crowded.summary.problem
+    assert f"{separation(history.position)[row]:.2f} m" in text
+
+
+def test_a_rule_that_asks_for_no_trust_distrusts_nobody():
+    path = recorded(EMERGENCY, 'control.rule="average"').path
+    for averaged in (load(path), load(without_log(path))):
+        assert averaged.trust[np.isfinite(averaged.mission_s), 4].max() < 0.5
+        assert words(averaged, Kind.DISTRUST) == []
 
 
 def test_a_recording_that_ends_before_its_flight_says_so_at_its_last_tick(tmp_path):

@@ -281,7 +281,7 @@ def test_the_log_tells_of_people_of_silence_and_of_other_hands():
     assert ("word", WARNING, "the operator says: land") in told
     assert ("link/uav_4", ERROR, "vehicle 4 is silent") in told
     assert ("link/uav_4", INFO, "vehicle 4 is heard again") in told
-    assert ("link/uav_4", WARNING, "vehicle 4 is not ours any more: nothing is sent to it") in told
+    assert ("hands/uav_4", WARNING, "vehicle 4 is not ours any more: nothing is sent to it") in told
     assert ("problem", ERROR, flight.summary.problem) in told
     labels = {text.text for _, drawn in scenes(flight) for n in SYSTEMS for text in drawn[f"uav_{n}"].texts}
     assert {"2: distrusted", "4: silent", "4: not ours"} <= labels
