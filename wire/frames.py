@@ -172,6 +172,12 @@ def sealed(body: bytes, message: int) -> bytes:
     return b"\xfd" + body + _checksum(body + _CRC_EXTRA[message]).to_bytes(2, "little")
 
 
+def sender_of(raw: bytes) -> tuple[int, int]:
+    """System and component of whoever sent a whole frame, as its header tells."""
+    at = 3 if raw[0] == MAGIC_1 else 5
+    return raw[at], raw[at + 1]
+
+
 def target_system(frame: Frame) -> int:
     """The system a frame is meant for; 0 is all of them."""
     at = _TARGET_AT.get(frame.message)

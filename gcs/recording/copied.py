@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap import records
 
-from gcs.recording.contents import RAW
+from gcs.recording.channels import RAW, Channel, Channels
 from gcs.recording.decoded import SCHEMA
 from gcs.recording.mcap_file import McapFile
 
@@ -14,35 +14,31 @@ from gcs.recording.mcap_file import McapFile
 class Copy:
     """Takes the records of a recording as they come; schemas and channels are told twice, in the data and behind it."""
 
-    def __init__(self, file: McapFile) -> None:
-        self._file = file
-        self._schemas: dict[int, int] = {0: 0}
-        self._decoded: set[int] = set()
-        """Schemas of decoded messages."""
-        self._channels: dict[int, tuple[int, bool]] = {}
-        """Channel of the recording → that of the copy, and whether it is of raw frames."""
+    def __init__(self, file: McapFile, channels: Channels) -> None:
+        """channels: of the file."""
+        self._file, self._defined = file, channels
+        self._schemas: dict[int, tuple[str, str, bytes]] = {0: ("", "", b"")}
+        self._channels: dict[int, Channel] = {}
         self.written = 0
         """Messages."""
 
-    def take(self, record: Any) -> Message | None:
+    def take(self, record: Any) -> records.Message | None:
         """Copy this record; a raw frame is handed back."""
         match record:
-            case Message(channel_id=source) if source in self._channels:
-                channel, raw = self._channels[source]
-                self._file.add(channel, record.log_time, record.data)
+            case records.Message():
+                channel = self._channels[record.channel_id]
+                if channel.schema_name.startswith(SCHEMA):
+                    return None
+                self._defined.add(channel, record.log_time, record.data)
                 self.written += 1
-                return record if raw else None
-            case Schema(id=source, name=name):
-                if name.startswith(SCHEMA):
-                    self._decoded.add(source)
-                elif source not in self._schemas:
-                    self._schemas[source] = self._file.schema(name, record.encoding, record.data)
-            case Channel(id=source, message_encoding=encoding, schema_id=schema):
-                if schema not in self._decoded and source not in self._channels:
-                    channel = self._file.channel(record.topic, encoding, self._schemas[schema])
-                    self._channels[source] = channel, encoding == RAW
-            case Attachment():
+                return record if channel.encoding == RAW else None
+            case records.Schema():
+                self._schemas[record.id] = record.name, record.encoding, record.data
+            case records.Channel():
+                schema = self._schemas[record.schema_id]
+                self._channels[record.id] = Channel(record.topic, record.message_encoding, *schema)
+            case records.Attachment():
                 self._file.attach(record.log_time, record.name, record.media_type, record.data)
-            case Metadata():
+            case records.Metadata():
                 self._file.metadata(record.name, record.metadata)
         return None

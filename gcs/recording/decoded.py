@@ -11,43 +11,24 @@ from typing import Any
 
 import orjson
 
+from gcs.recording.channels import Channel, Message
 from gcs.recording.layouts import Field, layout, layout_named
-from gcs.recording.mcap_file import McapFile
 from wire.frames import Frame
 
 SCHEMA = "mavlink."
 """Before a message's name: the name of its schema."""
 
 
-class DecodedTopics:
-    """The decoded messages of a file: a topic for each message of each sender."""
-
-    def __init__(self, file: McapFile) -> None:
-        self._file = file
-        self._schemas: dict[str, int] = {}
-        self._channels: dict[str, int] = {}
-        self.written = 0
-        """Messages."""
-
-    def add(self, frame: Frame) -> None:
-        """What a frame says, at its time; nothing of a message that our dialect lacks. Raises OSError."""
-        said = decoded(frame)
-        if said is not None:
-            name, data = said
-            self._file.add(self._channel(topic(frame.system, frame.component, name), name), frame.time_ns, data)
-            self.written += 1
-
-    def _channel(self, path: str, name: str) -> int:
-        if name not in self._schemas:
-            self._schemas[name] = self._file.schema(f"{SCHEMA}{name}", "jsonschema", schema(name))
-        if path not in self._channels:
-            self._channels[path] = self._file.channel(path, "json", self._schemas[name])
-        return self._channels[path]
+def message(frame: Frame) -> Message | None:
+    """What a frame says, at its time, for a topic of its message and sender; None where our dialect lacks it."""
+    said = decoded(frame)
+    return None if said is None else Message(_channel(frame.system, frame.component, said[0]), frame.time_ns, said[1])
 
 
-def topic(system: int, component: int, name: str) -> str:
-    """Where the decoded messages of this name and sender are."""
-    return f"/mavlink/{system}_{component}/{name}"
+@cache
+def _channel(system: int, component: int, name: str) -> Channel:
+    topic = f"/mavlink/{system}_{component}/{name}"
+    return Channel(topic, "json", f"{SCHEMA}{name}", "jsonschema", schema(name))
 
 
 def decoded(frame: Frame) -> tuple[str, bytes] | None:

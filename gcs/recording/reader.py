@@ -20,6 +20,7 @@ from gcs.events import Event, Rating
 from gcs.gate import LOST_NS
 from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
 from gcs.mission import plan
+from gcs.recording.channels import RAW, raw_topic
 from gcs.recording.files import FAULTS, MADE, METADATA, SCENARIO, SUMMARY
 from gcs.recording.mcap_file import MAGIC
 from gcs.track import Parts, Point, Track
@@ -227,7 +228,7 @@ def rating_of(content: Mapping[str, Any]) -> Rating:
     return Rating(content["rater"], None if whom == "swarm" else whom, content["rating"], content["time_s"])
 
 
-SENT = f"/mavlink/{GROUND_SYSTEM}_{GROUND_COMPONENT}/raw"
+SENT = raw_topic(GROUND_SYSTEM, GROUND_COMPONENT)
 """Topic of what the ground station sent."""
 
 
@@ -243,7 +244,7 @@ def paged(messages: Iterable[Message]) -> Iterator[RecordedTick]:
     for topic, encoding, time_ns, data in messages:
         if topic == SENT:
             sent.append(data)
-        elif encoding == "mavlink":
+        elif encoding == RAW:
             received += framer.frames(time_ns, data)
         elif topic == "/ratings":
             said.append(rating_of(orjson.loads(data)))

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy.typing as npt
 
+SCHEMA = "trustr."
+"""Before a topic's title: the name of its schema."""
 Vector = npt.NDArray[Any]
 """One number for each vehicle."""
 Table = npt.NDArray[Any]

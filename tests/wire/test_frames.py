@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from wire.frames import Framer, Sender, decode, target_system
+from wire.frames import Framer, Sender, decode, sender_of, target_system
 
 NOW = 1_700_000_000_000_000_000
 MESSAGES = sorted(dialect.mavlink_map.items())
@@ -91,6 +91,13 @@ def test_mavlink_1_is_read_too():
     assert (frame.system, frame.component, frame.message, frame.raw) == (9, 1, 0, data)
     assert decode(frame).custom_mode == 5
     assert framer.rejected == framer.garbage_bytes == 0
+
+
+@given(st.integers(1, 255), st.integers(0, 255), st.booleans())
+def test_a_frame_tells_its_sender_without_being_taken_apart(system, component, old):
+    packer = dialect.MAVLink(None, srcSystem=system, srcComponent=component)
+    message = dialect.MAVLink_heartbeat_message(2, 3, 0x51, 5, 4, 3)
+    assert sender_of(bytes(message.pack(packer, force_mavlink1=old))) == (system, component)
 
 
 def test_a_signed_frame_is_read_with_its_signature():
