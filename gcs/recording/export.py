@@ -6,21 +6,23 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Literal
 
-from mcap.records import Channel, Message
+from mcap.records import Channel, Message, Schema
 from rich import box
 from rich.table import Table as Listing
 
 from gcs.guard import DONE
 from gcs.output import check_free, whole, whole_folder
-from gcs.recording import tables
-from gcs.recording.contents import RAW, frame_of, frames, records
+from gcs.recording import decoded, tables
+from gcs.recording.channels import RAW, Channels
+from gcs.recording.contents import frame_of, frames, records
 from gcs.recording.copied import Copy
-from gcs.recording.decoded import DecodedTopics
+from gcs.recording.files import importing
 from gcs.recording.mcap_file import McapFile
-from gcs.recording.reader import UnreadableRecording, located
+from gcs.recording.reader import UnreadableRecording, located, readable
 from gcs.recording.table_files import MEANINGS, CsvFile, TableFile, TableFolder, parquet_file
 from gcs.recording.tidy import Row, Tidy, of_frame
 from gcs.recording.tlog import packed
+from gcs.recording.topics import SCHEMA
 
 Form = Literal["tlog", "csv", "parquet", "mcap"]
 NAMES: dict[Form, str] = {"tlog": "-frames.tlog", "csv": "-csv", "parquet": "-parquet", "mcap": "-decoded.mcap"}
@@ -34,7 +36,7 @@ def export(path: Path, *, to: Form, out: Path | None, console: Any) -> int:
     """
     path = located(path)
     if path.suffix == ".tlog":
-        raise UnreadableRecording(f"{path}: no recording: gcs log import makes one of it")
+        raise UnreadableRecording(f"{path}: no recording: {importing(path)} makes one of it")
     if out is None:
         out = path.with_name(f"{path.stem}{NAMES[to]}")
     check_free(out)
@@ -53,20 +55,24 @@ def _to_tlog(path: Path, out: Path, console: Any) -> None:
         for time_ns, raw in frames(path):
             file.write(packed(time_ns, raw))
             count += 1
+        if not count:
+            raise UnreadableRecording(f"{path}: holds no MAVLink frame: there is nothing to write to a .tlog")
     _say(console, f"{out.resolve()}: {count} frames")
 
 
 def _to_mcap(path: Path, out: Path, console: Any) -> None:
     """All that is there, and decoded messages beside their frames. Those that are there already are not doubled."""
     with whole(out) as unfinished, McapFile(unfinished) as file:
-        decoded, copy = DecodedTopics(file), Copy(file)
+        channels, added = Channels(file), 0
+        copy = Copy(file, channels)
         for record in records(path):
             raw = copy.take(record)
-            if raw is not None:
-                frame = frame_of(raw.log_time, raw.data)
-                if frame is not None:
-                    decoded.add(frame)
-    _say(console, f"{out.resolve()}: {copy.written} messages, and {decoded.written} decoded")
+            frame = None if raw is None else frame_of(raw.log_time, raw.data)
+            said = None if frame is None else decoded.message(frame)
+            if said is not None:
+                channels.add(*said)
+                added += 1
+    _say(console, f"{out.resolve()}: {copy.written} messages, and {added} decoded")
 
 
 def _to_tables(path: Path, out: Path, console: Any, *, kind: Callable[[Path, tables.Table], TableFile]) -> None:
@@ -74,6 +80,8 @@ def _to_tables(path: Path, out: Path, console: Any, *, kind: Callable[[Path, tab
     with whole_folder(out) as unfinished, TableFolder(unfinished, kind) as folder:
         for table, row in _rows(path):
             folder.add(table, row)
+        if not folder.rows:
+            raise UnreadableRecording(f"{path}: holds neither frames nor topics of ours: there is no table to write")
         if any(table.name in folder.rows for table in tables.OURS):  # a flight of ours has all of them, rows or none
             for table in tables.OURS:
                 folder.make(table)
@@ -88,19 +96,22 @@ def _to_tables(path: Path, out: Path, console: Any, *, kind: Callable[[Path, tab
 
 def _rows(path: Path) -> Iterator[tuple[tables.Table, Row]]:
     """Every row that a recording makes, with its table."""
-    tidy, channels = Tidy(), dict[int, Channel]()
-    for record in records(path):
-        if isinstance(record, Channel):
-            channels[record.id] = record
-        elif isinstance(record, Message):
-            channel = channels[record.channel_id]
-            if channel.message_encoding == RAW:
-                frame = frame_of(record.log_time, record.data)
-                row = None if frame is None else of_frame(frame)
-                if row is not None:
-                    yield row
-            elif channel.message_encoding == "json":
-                yield from tidy.rows(channel.topic, record.log_time, record.data)
+    tidy, channels, ours = Tidy(), dict[int, Channel](), set[int]()
+    with readable(path):
+        for record in records(path):
+            if isinstance(record, Schema) and record.name.startswith(SCHEMA):
+                ours.add(record.id)
+            elif isinstance(record, Channel):
+                channels[record.id] = record
+            elif isinstance(record, Message):
+                channel = channels[record.channel_id]
+                if channel.message_encoding == RAW:
+                    frame = frame_of(record.log_time, record.data)
+                    row = None if frame is None else of_frame(frame)
+                    if row is not None:
+                        yield row
+                elif channel.schema_id in ours:
+                    yield from tidy.rows(channel.topic, record.log_time, record.data)
 
 
 def _to_csv(path: Path, out: Path, console: Any) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import glob
+import re
+import shlex
 from pathlib import Path
 
 SCENARIO = "scenario.json"
@@ -26,13 +28,34 @@ def part(recording: Path, number: int) -> Path:
     return recording if number == 1 else recording.with_suffix(f".part{number}{recording.suffix}")
 
 
-def further_parts(recording: Path) -> list[Path]:
-    """Those of part 2 and on that are there, in their order."""
+def further(recording: Path) -> list[tuple[int, Path]]:
+    """Number and file of part 2 and on, of those that are there, in their order."""
     found = recording.parent.glob(f"{glob.escape(recording.stem)}.part*{recording.suffix}")
     numbers = ((path.stem.removeprefix(f"{recording.stem}.part"), path) for path in found)
-    return [path for _, path in sorted((int(number), path) for number, path in numbers if number.isdecimal())]
+    return sorted((int(number), path) for number, path in numbers if number.isdecimal())
+
+
+def further_parts(recording: Path) -> list[Path]:
+    """The same without their numbers."""
+    return [path for _, path in further(recording)]
+
+
+def whole_of(path: Path) -> Path | None:
+    """The recording that a file is a further part of, by its name; None of any other."""
+    named = re.fullmatch(r"(.+)\.part\d+", path.stem)
+    return None if named is None else path.with_name(f"{named[1]}{path.suffix}")
 
 
 def journal(recording: Path) -> Path:
     """The log of all frames beside it, in flights with real links."""
     return recording.with_suffix(".tlog")
+
+
+def recovering(recording: Path) -> str:
+    """The command that rebuilds a recording, ready to be typed."""
+    return shlex.join(["gcs", "log", "recover", str(recording)])
+
+
+def importing(journal: Path) -> str:
+    """The command that makes a recording of a journal, or of another ground station's log."""
+    return shlex.join(["gcs", "log", "import", str(journal)])

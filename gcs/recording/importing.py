@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import hashlib
+from mmap import mmap
 from pathlib import Path
 from typing import Any
 
 from gcs.console import say
 from gcs.guard import DONE
 from gcs.output import check_free, whole
-from gcs.recording.contents import RAW, frame_of
-from gcs.recording.decoded import DecodedTopics
-from gcs.recording.mcap_file import McapFile
+from gcs.recording import decoded
+from gcs.recording.channels import Channels, raw_channel
+from gcs.recording.contents import frame_of, mapped
+from gcs.recording.mcap_file import MAGIC, McapFile
 from gcs.recording.reader import UnreadableRecording
 from gcs.recording.tlog import Entries, Entry
-from wire.frames import MAGIC_2
+from wire.frames import sender_of
 
 IMPORTED = "imported"
 """Name of the metadata record that says where the frames came from; such a recording has no scenario."""
@@ -29,13 +31,12 @@ def import_tlog(path: Path, *, out: Path | None, console: Any) -> int:
     """Write raw frames by sender, and decoded beside them. Exit code. Raises UnreadableRecording and Unwritable."""
     out = path.with_suffix(".mcap") if out is None else out
     check_free(out)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise UnreadableRecording(f"{path}: cannot be read: {error.strerror or error}") from None
+    data = mapped(path)
+    if data[: len(MAGIC)] == MAGIC:
+        raise UnreadableRecording(f"{path}: an MCAP file already: there is nothing to import")
     log, clock = Entries(data), Clock()
     with whole(out) as unfinished, McapFile(unfinished) as file:
-        senders = _Senders(file)
+        senders = _Senders(Channels(file))
         for entry in log:
             clock.take(entry.time_us)
             senders.add(entry)
@@ -43,6 +44,8 @@ def import_tlog(path: Path, *, out: Path | None, console: Any) -> int:
             raise UnreadableRecording(f"{path}: no .tlog: there is no MAVLink frame behind a time in it")
         file.metadata(IMPORTED, _origin(path, data, senders.frames, log.skipped))
     problems = clock.problems()
+    if log.mended:
+        problems.append(f"{log.mended} of its times cannot be: their frames are put at the time of the one before")
     if log.skipped > len(data) / 2:
         problems.append("most of it is no frame behind a time: is it a .tlog?")
     for problem in problems:
@@ -53,7 +56,7 @@ def import_tlog(path: Path, *, out: Path | None, console: Any) -> int:
     return DONE
 
 
-def _origin(path: Path, data: bytes, frames: int, skipped: int) -> dict[str, str]:
+def _origin(path: Path, data: bytes | mmap, frames: int, skipped: int) -> dict[str, str]:
     return {
         "file": path.name,
         "bytes": str(len(data)),
@@ -66,30 +69,27 @@ def _origin(path: Path, data: bytes, frames: int, skipped: int) -> dict[str, str
 class _Senders:
     """Raw and decoded topics of whoever is in a log."""
 
-    def __init__(self, file: McapFile) -> None:
-        self._file = file
-        self._decoded = DecodedTopics(file)
-        self._channels: dict[tuple[int, int], int] = {}
+    def __init__(self, channels: Channels) -> None:
+        self._channels = channels
+        self._heard = set[tuple[int, int]]()
         self.frames = 0
 
     @property
     def count(self) -> int:
         """How many there are."""
-        return len(self._channels)
+        return len(self._heard)
 
     def add(self, entry: Entry) -> None:
         """A frame at its time. Raises OSError."""
         time_ns, raw = entry.time_us * 1000, entry.raw
-        system, component = raw[5:7] if raw[0] == MAGIC_2 else raw[3:5]
-        channel = self._channels.get((system, component))
-        if channel is None:
-            channel = self._file.channel(f"/mavlink/{system}_{component}/raw", RAW)
-            self._channels[system, component] = channel
-        self._file.add(channel, time_ns, raw)
+        sender = sender_of(raw)
+        self._heard.add(sender)
+        self._channels.add(raw_channel(*sender), time_ns, raw)
         self.frames += 1
         frame = frame_of(time_ns, raw)
-        if frame is not None:
-            self._decoded.add(frame)
+        said = None if frame is None else decoded.message(frame)
+        if said is not None:
+            self._channels.add(*said)
 
 
 class Clock:

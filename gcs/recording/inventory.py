@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,14 +16,16 @@ from pydantic import ValidationError
 
 from gcs.messages import GROUND_SYSTEM
 from gcs.recording import files
-from gcs.recording.contents import RAW, frame_of, records
+from gcs.recording.channels import RAW, raw_topic
+from gcs.recording.contents import frame_of, mapped, records
 from gcs.recording.files import METADATA, SCENARIO, SUMMARY
 from gcs.recording.layouts import layout
 from gcs.recording.reader import UnreadableRecording
-from gcs.recording.salvage import Damage, raw_topic, salvage
+from gcs.recording.salvage import Damage, Salvaged, salvage
 from gcs.recording.tlog import Entries
+from gcs.recording.topics import SCHEMA
 from scenarios import Scenario
-from wire.frames import MAGIC_2
+from wire.frames import sender_of
 
 SOFTWARE = ("trustr", "python", "jsbsim", "pymavlink", "numpy", "mcap")
 """Whose versions a recording tells."""
@@ -63,9 +66,9 @@ class Inventory:
     """Whether its end is not torn off."""
     damage: Sequence[Damage]
     scenario: Scenario | None
-    """None where there is none, or none that this version understands."""
+    """None where there is none of ours, or none that this version understands."""
     metadata: Mapping[str, Mapping[str, str]]
-    """Record → values."""
+    """Record → values; none of another program's file, whose records of these names are about something else."""
 
     @property
     def whole(self) -> bool:
@@ -85,7 +88,7 @@ class Inventory:
     @property
     def summary(self) -> Mapping[str, Any]:
         """What the run reported; empty where the file ends before it."""
-        told: dict[str, Any] = orjson.loads(self.metadata[SUMMARY]["json"]) if SUMMARY in self.metadata else {}
+        told: dict[str, Any] = orjson.loads(self.metadata.get(SUMMARY, {}).get("json", "{}"))
         return told
 
     @property
@@ -99,8 +102,8 @@ class Inventory:
         """How many: by the scenario, else by who speaks."""
         if self.scenario is not None:
             return self.scenario.swarm.count
-        senders = {one.sort.topic.split("/")[2].split("_")[0] for one in self.listed if one.sort.encoding == RAW}
-        return len(senders - {str(GROUND_SYSTEM)})
+        senders = {_SENDER.match(one.sort.topic) for one in self.listed if one.sort.encoding == RAW}
+        return len({int(sender[1]) for sender in senders if sender is not None} - {GROUND_SYSTEM})
 
     @property
     def bytes_per_vehicle_minute(self) -> float | None:
@@ -120,97 +123,104 @@ class Inventory:
         return path if path != self.path and path.exists() else None
 
 
+_SENDER = re.compile(r"/mavlink/(\d+)_\d+/")
+
+
 def inventory(path: Path) -> Inventory:
     """Read all of a file. Raises UnreadableRecording where it holds no message."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise UnreadableRecording(f"{path}: cannot be read: {error.strerror or error}") from None
-    found = _of_log(path, data) if path.suffix == files.journal(path).suffix else _of_mcap(path, data)
+    found = _of_log(path) if path.suffix == files.journal(path).suffix else _of_mcap(path)
     if not found.listed:
         raise UnreadableRecording(f"{path}: holds no message")
     return found
 
 
-def _of_mcap(path: Path, data: bytes) -> Inventory:
+def _of_mcap(path: Path) -> Inventory:
     """By a reader that believes the file; by what can be salvaged where that fails."""
     try:
-        every = list(records(path))
+        counted = _Counted()
+        for record in records(path):
+            counted.take(record)
+        return counted.inventory(path)
     except UnreadableRecording:
-        left = salvage(data)
+        left = salvage(mapped(path))
         if not left.counts:
             raise
-        told = (
-            (Sort(topic, encoding, "" if schema is None else schema.name), time_ns, content)
-            for topic, encoding, schema, time_ns, content in left.messages()
-        )
-        return _listed(path, data, told, left.attachments, left.metadata, ended=left.ended, damage=left.damage)
-    attachments = [record for record in every if isinstance(record, Attachment)]
-    metadata = [record for record in every if isinstance(record, Metadata)]
-    return _listed(path, data, _sorted(every), attachments, metadata)
+        return _salvaged(path, left)
 
 
-Told = tuple[Sort, int, bytes]
-"""What a message is, its time in ns since 1970, and what it says."""
+def _salvaged(path: Path, left: Salvaged) -> Inventory:
+    counted = _Counted()
+    for channel, time_ns, data in left.messages():
+        counted.note(Sort(channel.topic, channel.encoding, channel.schema_name), time_ns, data)
+    for record in (*left.attachments, *left.metadata):
+        counted.take(record)
+    return counted.inventory(path, ended=left.ended, damage=left.damage)
 
 
-def _sorted(every: Iterable[Any]) -> Iterator[Told]:
-    kinds, sorts = {0: ""}, dict[int, Sort]()
-    for record in every:
-        match record:
-            case Message():
-                yield sorts[record.channel_id], record.log_time, record.data
-            case Schema():
-                kinds[record.id] = record.name
-            case Channel():
-                sorts[record.id] = Sort(record.topic, record.message_encoding, kinds[record.schema_id])
-
-
-def _of_log(path: Path, data: bytes) -> Inventory:
-    log = Entries(data)
-    told = [(_sort_of(raw), time_us * 1000, raw) for time_us, raw in log]
-    damage = [Damage(0, log.skipped, None, None)] if log.skipped else []
-    return _listed(path, data, told, damage=damage)
+def _of_log(path: Path) -> Inventory:
+    log, counted = Entries(mapped(path)), _Counted()
+    for time_us, raw in log:
+        counted.note(_sort_of(raw), time_us * 1000, raw)
+    return counted.inventory(path, damage=[Damage(0, log.skipped, None, None)] if log.skipped else [])
 
 
 def _sort_of(raw: bytes) -> Sort:
     """Of a frame."""
-    system, component = raw[5:7] if raw[0] == MAGIC_2 else raw[3:5]
     frame = frame_of(0, raw)
     known = None if frame is None else layout(frame.message)
-    return Sort(raw_topic(system, component), RAW, "unknown" if known is None else known.name)
+    return Sort(raw_topic(*sender_of(raw)), RAW, "unknown" if known is None else known.name)
 
 
-def _listed(
-    path: Path,
-    data: bytes,
-    told: Iterable[Told],
-    attachments: Iterable[Attachment] = (),
-    metadata: Iterable[Metadata] = (),
-    *,
-    ended: bool = True,
-    damage: Sequence[Damage] = (),
-) -> Inventory:
-    lengths, times = defaultdict[Sort, list[int]](list), list[int]()
-    for sort, time_ns, content in told:
-        lengths[sort].append(len(content))
-        times.append(time_ns)
-    return Inventory(
-        path=path,
-        bytes=len(data),
-        begin_ns=min(times, default=0),
-        end_ns=max(times, default=0),
-        listed=[Listed(sort, len(each), sum(each)) for sort, each in sorted(lengths.items())],
-        ended=ended,
-        damage=damage,
-        scenario=_scenario(attachments),
-        metadata={record.name: record.metadata for record in metadata},
-    )
+class _Counted:
+    """What is in a file, while its records go by."""
+
+    def __init__(self) -> None:
+        self._kinds, self._sorts = {0: ""}, dict[int, Sort]()
+        self._listed = defaultdict[Sort, list[int]](lambda: [0, 0])
+        """How many messages, and how many bytes."""
+        self._begin_ns, self._end_ns = 1 << 64, 0
+        self._scenario = b""
+        self._metadata: dict[str, Mapping[str, str]] = {}
+
+    def take(self, record: Any) -> None:
+        """One of the mcap library's."""
+        match record:
+            case Message():
+                self.note(self._sorts[record.channel_id], record.log_time, record.data)
+            case Schema():
+                self._kinds[record.id] = record.name
+            case Channel():
+                sort = Sort(record.topic, record.message_encoding, self._kinds[record.schema_id])
+                self._sorts[record.id] = sort
+            case Attachment(name=name) if name == SCENARIO:
+                self._scenario = record.data
+            case Metadata():
+                self._metadata[record.name] = record.metadata
+
+    def note(self, sort: Sort, time_ns: int, data: bytes) -> None:
+        """One message."""
+        so_far = self._listed[sort]
+        so_far[0] += 1
+        so_far[1] += len(data)
+        self._begin_ns, self._end_ns = min(self._begin_ns, time_ns), max(self._end_ns, time_ns)
+
+    def inventory(self, path: Path, *, ended: bool = True, damage: Sequence[Damage] = ()) -> Inventory:
+        """Of all that went by."""
+        ours = any(sort.kind.startswith(SCHEMA) for sort in self._listed)
+        return Inventory(
+            path=path,
+            bytes=path.stat().st_size,
+            begin_ns=self._begin_ns if self._listed else 0,
+            end_ns=self._end_ns,
+            listed=[Listed(sort, *so_far) for sort, so_far in sorted(self._listed.items())],
+            ended=ended,
+            damage=damage,
+            scenario=_scenario(self._scenario) if ours else None,
+            metadata=self._metadata if ours and METADATA in self._metadata else {},
+        )
 
 
-def _scenario(attachments: Iterable[Attachment]) -> Scenario | None:
-    for attachment in attachments:
-        if attachment.name == SCENARIO:
-            with suppress(ValidationError):
-                return Scenario.model_validate_json(attachment.data)
+def _scenario(data: bytes) -> Scenario | None:
+    with suppress(ValidationError):
+        return Scenario.model_validate_json(data)
     return None

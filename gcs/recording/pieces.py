@@ -12,6 +12,7 @@ import zlib
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from io import BytesIO
+from mmap import mmap
 
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
@@ -32,7 +33,7 @@ _SHAPE = re.compile(
 """How a chunk, an attachment or metadata begins: none is longer than 2⁴⁰ bytes."""
 
 
-def pieces(data: bytes) -> Iterator[tuple[int, int, Chunk | Attachment | Metadata]]:
+def pieces(data: bytes | mmap) -> Iterator[tuple[int, int, Chunk | Attachment | Metadata]]:
     """(begin, end, record) of all that something vouches for, and of metadata that came without a CRC."""
     at = 0
     while (shape := _SHAPE.search(data, at)) is not None:
@@ -53,7 +54,7 @@ def pieces(data: bytes) -> Iterator[tuple[int, int, Chunk | Attachment | Metadat
 def _chunk(record: bytes) -> Chunk | None:
     chunk: Chunk = Chunk.read(stream_of(record))
     content = content_of(chunk)
-    for opcode, start, stop in records(content):
+    for opcode, start, stop in spans(content):
         if stop > len(content) or (opcode == Opcode.MESSAGE and stop - start < MESSAGE.size):
             return None
     right = zlib.crc32(content) == chunk.uncompressed_crc and len(content) == chunk.uncompressed_size
@@ -88,6 +89,11 @@ def stream_of(record: bytes) -> ReadDataStream:
     return ReadDataStream(BytesIO(record[RECORD.size :]))
 
 
+def content_at(data: bytes | mmap, start: int, stop: int) -> bytes:
+    """What the chunk holds that is there. Raises DAMAGE."""
+    return content_of(Chunk.read(stream_of(data[start:stop])))
+
+
 def content_of(chunk: Chunk) -> bytes:
     """What a chunk holds, decompressed. Raises DAMAGE."""
     stream, length = get_chunk_data_stream(chunk)
@@ -95,7 +101,7 @@ def content_of(chunk: Chunk) -> bytes:
     return content
 
 
-def records(content: bytes) -> Iterator[tuple[int, int, int]]:
+def spans(content: bytes) -> Iterator[tuple[int, int, int]]:
     """(opcode, begin, end) of the body of each record that stands there, one behind the other."""
     at = 0
     while at < len(content):

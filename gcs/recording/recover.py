@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -15,14 +15,18 @@ from rich.text import Text
 from gcs.console import write
 from gcs.output import check_free, whole
 from gcs.recording import files
+from gcs.recording.channels import Channels, Message
+from gcs.recording.contents import foreign, mapped
 from gcs.recording.files import DROPPED, METADATA, PART, SCENARIO
+from gcs.recording.gathered import Gathered, PartFile, gathered
 from gcs.recording.mcap_file import McapFile
 from gcs.recording.merge import completed
 from gcs.recording.reader import UnreadableRecording, located
 from gcs.recording.recovery import RECOVERED, Part, Recovery
-from gcs.recording.salvage import Rescued, Salvaged, salvage
 from gcs.recording.seal import SEAL, sealed
-from gcs.recording.tlog import Entries
+from gcs.recording.strays import JOURNAL
+from gcs.recording.tally import Tally, tally
+from gcs.recording.tlog import Entries, Entry
 
 PERIOD_S = 0.1
 """Of the loop, where the scenario that tells it is lost."""
@@ -32,7 +36,7 @@ def recover(path: Path, *, journal: Path | None, out: Path | None, as_json: bool
     """Rebuild a recording, or the one in a run's folder, and say what was found, lost and added. Exit code.
 
     journal: the one beside the recording, if None;  out: FILE-recovered.mcap, if None. Raises UnreadableRecording where
-    nothing is left, and Unwritable.
+    nothing is left, or the journal named is of another flight, and Unwritable.
     """
     path = located(path)
     recovery = rebuilt(path, journal=journal, out=out or path.with_name(f"{path.stem}-recovered{path.suffix}"))
@@ -46,68 +50,116 @@ def recover(path: Path, *, journal: Path | None, out: Path | None, as_json: bool
 def rebuilt(path: Path, *, journal: Path | None, out: Path) -> Recovery:
     """The same, without a word."""
     if path.suffix == files.journal(path).suffix:
-        raise UnreadableRecording(f"{path}: no recording: gcs log import makes one of it")
+        raise UnreadableRecording(f"{path}: no recording: {files.importing(path)} makes one of it")
     check_free(out)
-    if journal is None and files.journal(path).exists():
-        journal = files.journal(path)
-    log = None if journal is None else Entries(_bytes(journal))
-    entries = [] if log is None else list(log)
-    paths = [path, *files.further_parts(path)]
-    left = [salvage(_bytes(part)) for part in paths]
-    about = _About(left)
-    found = list(chain.from_iterable(part.messages() for part in left))
-    if not found:
-        hint = "" if journal is None else f"; gcs log import {journal} makes a recording of its journal"
-        raise UnreadableRecording(f"{path}: no MCAP file, or no message of it is left{hint}")
-    messages = list(completed(found, entries, period_ns=about.period_ns))
+    log = _Log.of(path, journal)
+    found = gathered(path)
+    needless = _needless(found)
+    if needless is not None:
+        return needless
+    about = _About(found.parts)
+    result = tally(about.messages(), log.entries, period_ns=about.period_ns)
+    left_out = list(found.left_out)
+    if log.entries and result.messages > result.added and not result.of_one_flight:
+        left_out.append((log.path, _of_another(result)))
+        if journal is not None:
+            raise UnreadableRecording("{}: {}".format(*left_out[-1]))
+        log = _Log(log.path, [])
+        result = tally(about.messages(), (), period_ns=about.period_ns)
+    if result.messages == result.added:
+        hint = f"; {files.importing(log.path)} makes a recording of its journal" if log.entries else ""
+        raise UnreadableRecording(f"{path}: no MCAP file, or nothing that a CRC vouches for is left of it{hint}")
     recovery = Recovery(
         out=out,
-        parts=[
-            Part(
-                part,
-                ended=what.ended,
-                messages=what.counts.total() - what.unnamed,
-                unnamed=what.unnamed,
-                damage=what.damage,
-                unsealed=what.unsealed,
-            )
-            for part, what in zip(paths, left, strict=True)
-        ],
-        journal=journal,
-        journal_skipped=0 if log is None else log.skipped,
-        added=len(messages) - len(found),
+        parts=[_part(one) for one in found.parts],
+        left_out=left_out,
+        journal=log.path if log.entries or log.skipped else None,
+        journal_skipped=log.skipped,
+        journal_mended=log.mended,
+        added=result.added,
         dropped=about.dropped,
-        messages=len(messages),
-        begin_ns=messages[0].time_ns,
-        end_ns=messages[-1].time_ns,
+        messages=result.messages,
+        begin_ns=result.begin_ns,
+        end_ns=result.end_ns,
+        missing=found.missing,
         lacking=about.lacking,
     )
     if recovery.needless:
         return replace(recovery, out=None)
-    _write(out, messages, about, recovery)
+    _write(out, completed(about.messages(), log.entries, period_ns=about.period_ns), about, recovery)
     return recovery
 
 
-def _bytes(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise UnreadableRecording(f"{path}: cannot be read: {error.strerror or error}") from None
+@dataclass(frozen=True, slots=True)
+class _Log:
+    """A recording's journal, or none."""
+
+    path: Path
+    entries: Sequence[Entry]
+    skipped: int = 0
+    """Bytes that are damaged."""
+    mended: int = 0
+    """Times that are."""
+
+    @staticmethod
+    def of(recording: Path, named: Path | None) -> _Log:
+        """The one that was named, else the one beside it. Raises UnreadableRecording where it is all there is."""
+        path = files.journal(recording) if named is None else named
+        if named is None and not path.exists():
+            return _Log(path, [])
+        if not recording.exists() and not files.further(recording):
+            hint = f"{files.importing(path)} makes a recording of its journal"
+            raise UnreadableRecording(f"{recording}: is not there; {hint}")
+        entries = Entries(mapped(path), JOURNAL)
+        return _Log(path, list(entries), entries.skipped, entries.mended)
+
+
+def _of_another(result: Tally) -> str:
+    same = "none is" if result.shared == 0 else f"only {result.shared} are"
+    return f"it is the journal of another flight: of {result.due} frames that both should have, {same} in both"
+
+
+def _needless(found: Gathered) -> Recovery | None:
+    """What is told of another program's file that is whole: salvage knows nothing that no CRC vouches for."""
+    (only, *others) = found.parts
+    if others or only.left.whole:
+        return None
+    told = foreign(only.path)
+    if told is None:
+        return None
+    unvouched = told.messages - only.left.counts.total()
+    part = Part(only.path, True, told.messages, unnamed=0, unvouched=unvouched, damage=(), unsealed=())
+    return Recovery(None, [part], messages=told.messages, begin_ns=told.begin_ns, end_ns=told.end_ns)
+
+
+def _part(one: PartFile) -> Part:
+    left = one.left
+    return Part(
+        one.path,
+        ended=left.ended,
+        messages=left.counts.total() - left.unnamed,
+        unnamed=left.unnamed,
+        unvouched=0,
+        damage=left.damage,
+        unsealed=left.unsealed,
+    )
 
 
 class _About:
     """What the parts of a recording tell of the whole."""
 
-    def __init__(self, parts: Sequence[Salvaged]) -> None:
-        self.attachments = {(a.name, a.data): a for part in parts for a in part.attachments}.values()
+    def __init__(self, parts: Sequence[PartFile]) -> None:
+        self._left = [part.left for part in parts]
+        self.attachments = {(a.name, a.data): a for left in self._left for a in left.attachments}.values()
         """Each once, though every part brings its own."""
-        last = {record.name: record.metadata for part in parts for record in part.metadata}
+        last = {record.name: record.metadata for left in self._left for record in left.metadata}
         self.metadata = {
             name: {key: value for key, value in values.items() if key not in (PART, DROPPED, SEAL)}
             for name, values in last.items()
             if name != RECOVERED
         }
-        self.dropped = int(last.get(METADATA, {}).get(DROPPED, "0"))
+        dropped = last.get(METADATA, {}).get(DROPPED, "")
+        self.dropped = int(dropped) if dropped.isdecimal() else 0
         """Messages that no part holds."""
         scenario = next((a.data for a in self.attachments if a.name == SCENARIO), None)
         self.period_ns = round((PERIOD_S if scenario is None else orjson.loads(scenario)["time"]["period_s"]) * 1e9)
@@ -117,21 +169,21 @@ class _About:
         if METADATA not in last:
             self.lacking.append("its metadata: versions, seed, and when it was flown")
 
+    def messages(self) -> Iterator[Message]:
+        """Of all parts, in their order."""
+        return chain.from_iterable(left.messages() for left in self._left)
 
-def _write(path: Path, messages: Sequence[Rescued], about: _About, recovery: Recovery) -> None:
+
+def _write(path: Path, messages: Iterable[Message], about: _About, recovery: Recovery) -> None:
     with whole(path) as unfinished, McapFile(unfinished) as file:
         for attachment in about.attachments:
             file.attach(attachment.log_time, attachment.name, attachment.media_type, attachment.data)
         told = {METADATA: {}, **about.metadata, RECOVERED: recovery.metadata()}
         for name, values in told.items():
             file.metadata(name, sealed(name, values))
-        schemas, channels = dict[str, int](), dict[str, int]()
-        for topic, encoding, schema, time_ns, data in messages:
-            if topic not in channels:
-                if schema is not None and schema.name not in schemas:
-                    schemas[schema.name] = file.schema(schema.name, schema.encoding, schema.data)
-                channels[topic] = file.channel(topic, encoding, 0 if schema is None else schemas[schema.name])
-            file.add(channels[topic], time_ns, data)
+        channels = Channels(file)
+        for message in messages:
+            channels.add(*message)
 
 
 def _tell(recovery: Recovery, console: Any) -> None:

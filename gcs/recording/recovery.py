@@ -24,6 +24,8 @@ class Part:
     """Those that are certainly what was recorded."""
     unnamed: int
     """Those that are whole as well, but what they belong to is lost."""
+    unvouched: int
+    """Those that no CRC vouches for, in another program's file."""
     damage: Sequence[Damage]
     unsealed: Sequence[str]
     """Names of metadata that nothing vouches for."""
@@ -41,25 +43,32 @@ class Recovery:
     out: Path | None
     """Where it is; None where there was nothing to rebuild."""
     parts: Sequence[Part]
-    journal: Path | None
-    journal_skipped: int
-    """Bytes of the journal that are damaged."""
-    added: int
-    """Frames that only the journal had."""
-    dropped: int
-    """Messages that the disk did not take when they were recorded."""
     messages: int
     """In all."""
     begin_ns: int
     end_ns: int
     """Times of the first and last message."""
-    lacking: Sequence[str]
+    left_out: Sequence[tuple[Path, str]] = ()
+    """Files beside it that were not used, and why."""
+    journal: Path | None = None
+    journal_skipped: int = 0
+    """Bytes of the journal that are damaged."""
+    journal_mended: int = 0
+    """Frames of the journal whose time is."""
+    added: int = 0
+    """Frames that only the journal had."""
+    dropped: int = 0
+    """Messages that the disk did not take when they were recorded."""
+    missing: Sequence[int] = ()
+    """Parts that are not there, though a later one is."""
+    lacking: Sequence[str] = ()
     """What is lost of the whole: its scenario, its metadata."""
 
     @property
     def needless(self) -> bool:
-        """Whether the recording was one file, whole, and lacked nothing."""
-        return len(self.parts) == 1 and self.parts[0].whole and not (self.added or self.lacking)
+        """Whether the recording was one file, whole, whoever wrote it, and its journal adds nothing."""
+        (only, *others) = self.parts
+        return only.whole and not (others or self.added or self.missing)
 
     @property
     def damaged_bytes(self) -> int:
@@ -89,6 +98,9 @@ class Recovery:
             "seconds_lost": self.lost_s,
             "messages_without_topic": sum(part.unnamed for part in self.parts),
             "messages_dropped": self.dropped,
+            "parts_missing": list(self.missing),
+            "left_out": {str(path.resolve()): why for path, why in self.left_out},
+            "journal_times_mended": self.journal_mended,
             "lost": list(self.lacking),
             "parts": [self._part(part) for part in self.parts],
         }
@@ -125,6 +137,7 @@ class Recovery:
             "seconds_lost": f"{self.lost_s:.3f}",
             "messages_without_topic": str(sum(part.unnamed for part in self.parts)),
             "messages_dropped": str(self.dropped),
+            "parts_missing": ", ".join(map(str, self.missing)),
             "lost": ", ".join(self.lacking),
             "words": "; ".join(words for _name, words in self.lines()),
         }
@@ -135,19 +148,28 @@ class Recovery:
             for words in self._found(part):
                 yield part.path.name, words
         if self.journal is not None:
-            skipped = f"; {_count(self.journal_skipped, 'byte')} of it are damaged" if self.journal_skipped else ""
-            yield self.journal.name, f"{_count(self.added, 'frame')} added that the recording lacks{skipped}"
+            yield self.journal.name, "; ".join(self._taken())
+        for path, why in self.left_out:
+            yield path.name, f"left out: {why}"
+        for number in self.missing:
+            yield "lost", f"part {number} of the recording: it is not there"
         if self.dropped:
-            yield (
-                "lost",
-                f"{_count(self.dropped, 'message')} that the disk did not take; frames of them are in the journal",
-            )
+            made_up = f"; its journal made up for {_count(self.added, 'frame')} of all" if self.added else ""
+            yield "lost", f"{_count(self.dropped, 'message')} that the disk did not take{made_up}"
         for words in self.lacking:
             yield "lost", words
 
+    def _taken(self) -> Iterator[str]:
+        yield f"{_count(self.added, 'frame')} added that the recording lacks"
+        if self.journal_skipped:
+            yield f"{_count(self.journal_skipped, 'byte')} of it are damaged"
+        if self.journal_mended:
+            yield f"{_count(self.journal_mended, 'frame')} put at the time of the one before, for its own cannot be"
+
     def _found(self, part: Part) -> Iterator[str]:
         if part.whole:
-            yield f"whole: {_count(part.messages, 'message')}"
+            vouched = f"; no CRC vouches for {part.unvouched} of them" if part.unvouched else ""
+            yield f"whole: {_count(part.messages, 'message')}{vouched}"
         elif part.ended:
             yield f"damaged: {_count(part.messages, 'message')} are left"
         else:

@@ -12,15 +12,18 @@ from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from io import BytesIO
+from mmap import mmap
 from typing import NamedTuple
 
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, Footer, Metadata, Schema
+from mcap.records import Attachment, Chunk, Footer, Metadata, Schema
+from mcap.records import Channel as ChannelRecord
 
-from gcs.recording.contents import RAW, frame_of
+from gcs.recording.channels import Channel, Message, raw_channel
+from gcs.recording.contents import frame_of
 from gcs.recording.mcap_file import MAGIC
-from gcs.recording.pieces import MESSAGE, RECORD, content_of, pieces, records, stream_of
+from gcs.recording.pieces import MESSAGE, RECORD, content_at, content_of, pieces, spans, stream_of
 from gcs.recording.seal import is_sealed
 
 _INDEX, _ENTRY = struct.Struct("<HI"), struct.Struct("<QQ")
@@ -28,16 +31,6 @@ _INDEX, _ENTRY = struct.Struct("<HI"), struct.Struct("<QQ")
 _NO_CRC = bytes(4)
 """At the end of the data, where nobody reckoned one."""
 _FOOTER_BYTES = 29
-
-
-class Rescued(NamedTuple):
-    """A message that is certainly what was recorded."""
-
-    topic: str
-    encoding: str
-    schema: Schema | None
-    time_ns: int
-    data: bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,16 +51,18 @@ class Damage:
 class Salvaged:
     """What is left of a file."""
 
+    data: bytes | mmap = b""
+    """All its bytes."""
     ended: bool = False
     """Whether it has its summary, whole."""
     damage: list[Damage] = field(default_factory=list)
     attachments: list[Attachment] = field(default_factory=list)
     metadata: list[Metadata] = field(default_factory=list)
     """None that is known to be damaged."""
-    chunks: list[Chunk] = field(default_factory=list)
-    """Those whose content is right."""
+    chunks: list[tuple[int, int]] = field(default_factory=list)
+    """Where those begin and end whose content is right."""
     schemas: dict[int, Schema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
+    channels: dict[int, ChannelRecord] = field(default_factory=dict)
     counts: Counter[int] = field(default_factory=Counter)
     """Channel → messages."""
 
@@ -86,33 +81,35 @@ class Salvaged:
         """Messages that are whole, but what they belong to is lost."""
         return self.counts.total() - sum(self.counts[number] for number in self._named())
 
-    def messages(self) -> Iterator[Rescued]:
-        """All messages whose topic is known, in the file's order."""
+    def messages(self) -> Iterator[Message]:
+        """All messages whose topic is known, in the file's order; each is certainly what was recorded."""
         named = self._named()
         for number, time_ns, data in self._messages(named):
-            topic, encoding, schema = named[number]
-            yield Rescued(topic, encoding, schema, time_ns, data)
+            yield Message(named[number], time_ns, data)
 
     def _messages(self, channels: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
-        for chunk in self.chunks:
-            content = content_of(chunk)
-            for opcode, start, stop in records(content):
+        for place in self.chunks if channels else ():
+            content = content_at(self.data, *place)
+            for opcode, start, stop in spans(content):
                 if opcode == Opcode.MESSAGE:
                     number, _sequence, time_ns, _publish_ns = MESSAGE.unpack_from(content, start)
                     if number in channels:
                         yield number, time_ns, content[start + MESSAGE.size : stop]
 
-    def _named(self) -> Mapping[int, tuple[str, str, Schema | None]]:
-        """Channel → topic, encoding and schema, of all that are known."""
-        named = {
-            number: (channel.topic, channel.message_encoding, self.schemas.get(channel.schema_id))
-            for number, channel in self.channels.items()
-            if channel.schema_id == 0 or channel.schema_id in self.schemas
-        }
-        return named | {number: (topic, RAW, None) for number, topic in self._told_by_frames(named)}
+    def _named(self) -> Mapping[int, Channel]:
+        """What is known of each channel."""
+        named = {}
+        for number, told in self.channels.items():
+            schema = self.schemas.get(told.schema_id)
+            if schema is not None:
+                kind = schema.name, schema.encoding, schema.data
+                named[number] = Channel(told.topic, told.message_encoding, *kind)
+            elif told.schema_id == 0:
+                named[number] = Channel(told.topic, told.message_encoding)
+        return named | dict(self._told_by_frames(named))
 
-    def _told_by_frames(self, named: Collection[int]) -> Iterator[tuple[int, str]]:
-        """Channels without a name of which every message is a whole frame of one sender, and their topics."""
+    def _told_by_frames(self, named: Collection[int]) -> Iterator[tuple[int, Channel]]:
+        """Channels without a name of which every message is a whole frame of one sender."""
         senders: defaultdict[int, set[tuple[int, int] | None]] = defaultdict(set)
         for number, time_ns, data in self._messages(self.counts.keys() - named):
             frame = frame_of(time_ns, data)
@@ -120,17 +117,12 @@ class Salvaged:
         for number, found in senders.items():
             sender = found.pop()
             if sender is not None and not found:
-                yield number, raw_topic(*sender)
+                yield number, raw_channel(*sender)
 
 
-def raw_topic(system: int, component: int) -> str:
-    """Of a sender's raw frames."""
-    return f"/mavlink/{system}_{component}/raw"
-
-
-def salvage(data: bytes) -> Salvaged:
+def salvage(data: bytes | mmap) -> Salvaged:
     """Everything in a file that can be trusted."""
-    left = Salvaged()
+    left = Salvaged(data)
     _take_summary(left, data)
     told = _Messages((), None, None)
     last_ns: int | None = None
@@ -141,6 +133,7 @@ def salvage(data: bytes) -> Salvaged:
         holes += _unexplained(data, reached, start, told, last_ns)
         reached = stop
         if isinstance(record, Chunk):
+            left.chunks.append((start, stop))
             told = _take(left, record)
             if not _as_written(record, data[start:stop], told):
                 holes.append(Damage(start, stop - start - len(record.data), last_ns, None))
@@ -165,10 +158,9 @@ class _Messages(NamedTuple):
 
 
 def _take(left: Salvaged, chunk: Chunk) -> _Messages:
-    left.chunks.append(chunk)
     places = []
     content = content_of(chunk)
-    for opcode, start, stop in records(content):
+    for opcode, start, stop in spans(content):
         if opcode == Opcode.MESSAGE:
             number, _sequence, time_ns, _publish_ns = MESSAGE.unpack_from(content, start)
             left.counts[number] += 1
@@ -193,11 +185,11 @@ def _define(left: Salvaged, opcode: int, body: bytes) -> None:
         schema: Schema = Schema.read(stream)
         left.schemas[schema.id] = schema
     elif opcode == Opcode.CHANNEL:
-        channel: Channel = Channel.read(stream)
+        channel: ChannelRecord = ChannelRecord.read(stream)
         left.channels[channel.id] = channel
 
 
-def _take_summary(left: Salvaged, data: bytes) -> None:
+def _take_summary(left: Salvaged, data: bytes | mmap) -> None:
     """Whether the file ended, and the schemas and channels that its summary repeats."""
     end = len(data) - len(MAGIC)
     at = end - _FOOTER_BYTES
@@ -208,23 +200,23 @@ def _take_summary(left: Salvaged, data: bytes) -> None:
     left.ended = right or footer.summary_crc == 0
     if right:
         summary = data[footer.summary_start : at]
-        for opcode, start, stop in records(summary):
+        for opcode, start, stop in spans(summary):
             _define(left, opcode, summary[start:stop])
 
 
-def _unexplained(data: bytes, start: int, stop: int, told: _Messages, after_ns: int | None) -> Iterator[Damage]:
+def _unexplained(data: bytes | mmap, start: int, stop: int, told: _Messages, after_ns: int | None) -> Iterator[Damage]:
     """What lies between two pieces, from the first byte on that is not as it should be there.
 
     told: what the chunk before them holds.
     """
     at = start
-    if start == 0 and data.startswith(MAGIC):
+    if start == 0 and data[: len(MAGIC)] == MAGIC:
         at = len(MAGIC)
     while at < stop:
         opcode, length = RECORD.unpack_from(data, at) if at + RECORD.size <= stop else (0, 0)
         body = data[at + RECORD.size : min(at + RECORD.size + length, stop)]
         if opcode == Opcode.DATA_END and stop == len(data):
-            if body not in (_NO_CRC, zlib.crc32(data[:at]).to_bytes(4, "little")):
+            if body not in (_NO_CRC, zlib.crc32(memoryview(data)[:at]).to_bytes(4, "little")):
                 yield Damage(at, RECORD.size + length, after_ns, None)
             return  # the summary has a CRC of its own, and is rebuilt
         header = opcode == Opcode.HEADER and at == len(MAGIC)

@@ -1,8 +1,7 @@
 """The .tlog of MAVProxy, QGroundControl and Mission Planner: each frame behind eight bytes of time.
 
 Page: https://ardupilot.org/dev/docs/mavlink-basics.html ("telemetry log"); µs since 1970, big-endian. A frame vouches
-for itself by its CRC, but for its signature. Nothing vouches for a time: one that strays from those of its neighbours
-is taken for damage.
+for itself by its CRC, but for its signature. Nothing vouches for a time: see `strays`.
 """
 
 from __future__ import annotations
@@ -12,26 +11,24 @@ import struct
 from collections import Counter
 from collections.abc import Iterator
 from functools import cached_property
+from mmap import mmap
 from pathlib import Path
 from typing import NamedTuple
 
 from fastcrc import crc16
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from gcs.recording.strays import ANY_LOG, LAST_TIME_US, Habits, mended
 from wire.frames import CRC, HEADER_1, HEADER_2, MAGIC_1, MAGIC_2, SIGNATURE, SIGNED
 
 _TIME = struct.Struct(">Q")
-LAST_TIME_US = 1 << 52
-"""The year 2112: a later time is none."""
-ASTRAY_US = 1_000_000
-"""How far a time may lie outside those of its neighbours: links of one log deliver out of order, by less."""
 
 
 class Entry(NamedTuple):
     """One frame of a log."""
 
     time_us: int
-    """Since 1970."""
+    """Since 1970; of one that strayed, that of the frame before."""
     raw: bytes
     """The whole frame, signature included."""
 
@@ -54,9 +51,12 @@ class Entries:
     (https://mavlink.io/en/guide/serialization.html).
     """
 
-    def __init__(self, data: bytes) -> None:
-        self._data = data
+    def __init__(self, data: bytes | mmap, habits: Habits = ANY_LOG) -> None:
+        """habits: of whoever wrote it."""
+        self._data, self._habits = data, habits
         self._kept = 0
+        self.mended = 0
+        """Times that strayed, once all were taken."""
 
     @property
     def skipped(self) -> int:
@@ -65,10 +65,11 @@ class Entries:
 
     def __iter__(self) -> Iterator[Entry]:
         """From the beginning."""
-        self._kept = 0
-        for entry in _borne_out(self._entries()):
+        self._kept = self.mended = 0
+        for entry, time_us in mended(self._entries(), self._habits):
             self._kept += _TIME.size + len(entry.raw)
-            yield entry
+            self.mended += time_us != entry.time_us
+            yield Entry(time_us, entry.raw)
 
     def _entries(self) -> Iterator[Entry]:
         at: int | None = 0
@@ -76,7 +77,7 @@ class Entries:
         """Where the next entry begins, if what the one before says of its length is true."""
         while at is not None:
             shape = _shape(self._data, at)
-            entry = self._entry(at, shape)
+            entry = self._entry(at, shape, timed=at != due)
             if shape is not None and entry is not None and (at == due or self._goes_on(shape.end)):
                 yield entry
                 at = due = shape.end
@@ -89,11 +90,11 @@ class Entries:
         return at == len(self._data) or self._entry_at(at) is not None
 
     def _entry_at(self, at: int) -> Entry | None:
-        return self._entry(at, _shape(self._data, at))
+        return self._entry(at, _shape(self._data, at), timed=True)
 
-    def _entry(self, at: int, shape: _Shape | None) -> Entry | None:
-        """The entry of this shape that begins there, if its time is one and its CRC is right."""
-        if shape is None or (time_us := _TIME.unpack_from(self._data, at)[0]) >= LAST_TIME_US:
+    def _entry(self, at: int, shape: _Shape | None, *, timed: bool) -> Entry | None:
+        """The entry of this shape that begins there, if its CRC is right. timed: if its time is one, too."""
+        if shape is None or ((time_us := _TIME.unpack_from(self._data, at)[0]) >= LAST_TIME_US and timed):
             return None
         extra = _CRC_EXTRA.get(shape.message)
         if extra is None:
@@ -134,7 +135,7 @@ _LAST_STEP = {_checksum(bytes([byte]), 0): byte for byte in range(256)}
 """What the last byte of a message adds to its checksum → that byte."""
 
 
-def _shape(data: bytes, at: int) -> _Shape | None:
+def _shape(data: bytes | mmap, at: int) -> _Shape | None:
     """Of the entry that may begin there, if all its bytes are there."""
     start = at + _TIME.size
     header = data[start : start + HEADER_2]
@@ -150,7 +151,7 @@ def _shape(data: bytes, at: int) -> _Shape | None:
     return _Shape(message, stop, end) if end <= len(data) else None
 
 
-def _implied_extra(data: bytes, at: int, shape: _Shape) -> int | None:
+def _implied_extra(data: bytes | mmap, at: int, shape: _Shape) -> int | None:
     """The CRC_EXTRA with which this CRC is right; of most wrong ones there is none."""
     before = _checksum(data[at + _TIME.size + 1 : shape.stop])
     last = _LAST_STEP.get((data[shape.stop] | data[shape.stop + 1] << 8) ^ before >> 8)
@@ -160,25 +161,7 @@ def _implied_extra(data: bytes, at: int, shape: _Shape) -> int | None:
 _MAGIC = re.compile(bytes([ord("["), MAGIC_2, MAGIC_1, ord("]")]))
 
 
-def _next_magic(data: bytes, at: int) -> int | None:
+def _next_magic(data: bytes | mmap, at: int) -> int | None:
     """Where, from there on, an entry may begin."""
     found = _MAGIC.search(data, at + _TIME.size)
     return None if found is None else found.start() - _TIME.size
-
-
-def _borne_out(entries: Iterator[Entry]) -> Iterator[Entry]:
-    """Without those whose time lies outside the times before and behind it: a clock that is set goes on from there."""
-    before, entry = None, next(entries, None)
-    for behind in entries:
-        assert entry is not None
-        if before is None or not _astray(entry.time_us, before.time_us, behind.time_us):
-            yield entry
-            before = entry
-        entry = behind
-    if entry is not None:
-        yield entry
-
-
-def _astray(time_us: int, before_us: int, behind_us: int) -> bool:
-    first, last = sorted((before_us, behind_us))
-    return not first - ASTRAY_US <= time_us <= last + ASTRAY_US

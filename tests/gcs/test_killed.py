@@ -15,11 +15,11 @@ import pytest
 from flights import FDM, GCS, SOAK, messages, scratch, start
 from relay import HOST, relay
 
-from gcs.recording.contents import RAW
+from gcs.recording.channels import RAW, Message
 from gcs.recording.history import load
 from gcs.recording.reader import SENT
 from gcs.recording.recover import rebuilt
-from gcs.recording.salvage import Rescued, salvage
+from gcs.recording.salvage import salvage
 from gcs.recording.tlog import Entry, entries
 from gcs.replay.verify import decide_again
 from wire.frames import Frame
@@ -36,7 +36,7 @@ class Killed:
     """What is left of one flight."""
 
     recording: Path
-    kept: list[Rescued]
+    kept: list[Message]
     """Frames of the recording as it was found."""
     journal: list[Entry]
     handed: list[Frame]
@@ -70,7 +70,7 @@ def killed(seed):
             vehicles.send_signal(signal.SIGINT)
             vehicles.communicate(timeout=20)
     recording = folder / "run.mcap"
-    kept = [message for message in salvage(recording.read_bytes()).messages() if message.encoding == RAW]
+    kept = [message for message in salvage(recording.read_bytes()).messages() if message.channel.encoding == RAW]
     return Killed(recording, kept, list(entries(recording.with_suffix(".tlog"))), between.passed)
 
 

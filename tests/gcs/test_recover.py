@@ -10,18 +10,19 @@ from flights import SOAK, fly_and_record, messages, scratch
 from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import SeekingReader
-from mcap.records import Chunk, Message
+from mcap import records
+from mcap.records import Chunk
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from gcs.output import Unwritable
-from gcs.recording.contents import RAW
+from gcs.recording.channels import RAW, Channel, Message, raw_topic
 from gcs.recording.files import DROPPED, METADATA, PART, SCENARIO
 from gcs.recording.history import load
 from gcs.recording.mcap_file import McapFile
 from gcs.recording.merge import completed
 from gcs.recording.reader import SENT, UnreadableRecording, read
 from gcs.recording.recover import rebuilt
-from gcs.recording.salvage import Rescued, raw_topic, salvage
+from gcs.recording.salvage import salvage
 from gcs.recording.seal import sealed
 from gcs.recording.tlog import Entry, packed
 from gcs.recording.writer import PROMPTLY_NS
@@ -52,7 +53,7 @@ def chunks(small):
     every = [one for one in StreamReader(BytesIO(data), emit_chunks=True).records if isinstance(one, Chunk)]
     indexes = SeekingReader(BytesIO(data)).get_summary().chunk_indexes
     ends = [index.chunk_start_offset + index.chunk_length for index in indexes]
-    counts = (sum(isinstance(record, Message) for record in breakup_chunk(chunk)) for chunk in every)
+    counts = (sum(isinstance(record, records.Message) for record in breakup_chunk(chunk)) for chunk in every)
     return list(zip(ends, accumulate(counts), strict=True))
 
 
@@ -82,7 +83,7 @@ def test_of_a_file_cut_short_anywhere_all_whole_chunks_are_recovered_and_nothing
     for size in (rng.randrange(len(data)) for _ in range(CUTS)):
         whole = max((count for end, count in chunks if end <= size), default=0)
         if whole == 0:
-            with pytest.raises(UnreadableRecording, match="no MCAP file, or no message of it is left"):
+            with pytest.raises(UnreadableRecording, match="no MCAP file, or nothing that a CRC vouches for is left"):
                 recovered(data[:size])
         else:
             assert recovered(data[:size])[1] == true[:whole]
@@ -134,7 +135,7 @@ def test_topics_are_told_again_often_enough_that_a_torn_long_recording_keeps_the
     left = salvage(bytes(data))
     assert len(left.damage) == 1
     assert (left.counts.total(), left.unnamed) == (199, 0)
-    assert {(message.topic, message.schema.name) for message in left.messages()} == {("/tick", "trustr.Tick")}
+    assert {(message.channel.topic, message.channel.schema_name) for message in left.messages()} == {("/tick", "trustr.Tick")}
 
 
 def test_metadata_with_a_flipped_bit_is_not_believed(small):
@@ -163,10 +164,10 @@ class Flying:
                     self._add(SENT, tick_ns + 5_000_000 + place * 1000, raw, later_ns=50_000)
             for topic in ("/swarm/state", "/tick"):
                 data = orjson.dumps({"tick": number, "topic": topic})
-                self.messages.append(Rescued(topic, "json", None, tick_ns, data))
+                self.messages.append(Message(Channel(topic, "json"), tick_ns, data))
 
     def _add(self, topic, time_ns, raw, *, later_ns):
-        self.messages.append(Rescued(topic, RAW, None, time_ns, raw))
+        self.messages.append(Message(Channel(topic, RAW), time_ns, raw))
         self.journal.append(Entry((time_ns + later_ns) // 1000, raw))
 
 
@@ -174,14 +175,14 @@ TURNS = st.lists(st.tuples(st.integers(0, 3), st.integers(0, 2)), min_size=1, ma
 
 
 def read_alike(every):
-    return [(message.topic, message.data) for message in every]
+    return [(message.channel.topic, message.data) for message in every]
 
 
 @given(TURNS, st.data())
 def test_with_a_whole_journal_every_frame_is_put_where_it_was(flying, data):
     lost = data.draw(st.sets(st.integers(0, len(flying.messages) - 1)))
     left = [message for place, message in enumerate(flying.messages) if place not in lost]
-    expected = [one for place, one in enumerate(flying.messages) if place not in lost or one.encoding == RAW]
+    expected = [one for place, one in enumerate(flying.messages) if place not in lost or one.channel.encoding == RAW]
     assert read_alike(completed(left, flying.journal, period_ns=PERIOD_NS)) == read_alike(expected)
 
 
@@ -236,7 +237,7 @@ def written(path, every, source, *, number, dropped, finish):
     file.metadata(METADATA, sealed(METADATA, about | {PART: str(number), DROPPED: str(dropped)}))
     scenario = source.attachments[0]
     file.attach(0, SCENARIO, scenario.media_type, scenario.data)
-    for topic, encoding, _schema, time_ns, data in every:
+    for (topic, encoding, *_schema), time_ns, data in every:
         if topic not in channels:
             channels[topic] = file.channel(topic, encoding)
         file.add(channels[topic], time_ns, data)
@@ -313,7 +314,7 @@ def test_a_file_of_which_nothing_is_left_is_refused_in_a_sentence(content, gcs, 
     code, out, err = gcs("log", "recover", tmp_path)
     assert (code, out) == (2, "")
     assert err.count("\n") == 1
-    assert "no MCAP file, or no message of it is left" in err
+    assert "no MCAP file, or nothing that a CRC vouches for is left" in err
 
 
 def test_a_journal_alone_is_to_be_imported(true, gcs, tmp_path):
