@@ -72,6 +72,15 @@ class Plan:
         """When results are read."""
         return self.segments[-1].ends_s + READ_OUT_AFTER_S
 
+    def calls_by(self, time_s: float) -> int:
+        """How many events have come by then."""
+        return sum(ahead[0].begins_s <= time_s + 1e-9 for ahead in self.known[1:])
+
+    def legs(self, calls: int) -> tuple[tuple[Segment, ...], tuple[Segment, ...]]:
+        """What was flown before so many events, as they cut it, and what lies ahead then as far as anybody knows."""
+        ahead = self.known[calls]
+        return tuple(segment for segment in self.segments if segment.begins_s < ahead[0].begins_s), ahead
+
     def segment_at(self, time_s: float) -> Segment:
         """The segment being flown; before the first it is the first, after the last the last."""
         return _at(self.segments, time_s)
@@ -125,8 +134,7 @@ def paper_leader(plan: Plan, time_s: float) -> VirtualLeader:
 
 def recommended_leader(plan: Plan, time_s: float) -> VirtualLeader:
     """Rounds and brakes by what is known at the time, and swings onto what nobody could know."""
-    called = sum(ahead[0].begins_s <= time_s + 1e-9 for ahead in plan.known[1:])
-    return _after_calls(plan, called, time_s)
+    return _after_calls(plan, plan.calls_by(time_s), time_s)
 
 
 PROFILES = {"paper": paper_leader, "recommended": recommended_leader}

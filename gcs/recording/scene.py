@@ -77,7 +77,7 @@ class Scene:
 
     def _draw_path(self, mission_s: float) -> None:
         """Of a mission that was broken off, whose time is NaN, it stays as it was."""
-        calls = sum(ahead[0].begins_s <= mission_s + 1e-9 for ahead in self._plan.known[1:])
+        calls = self._plan.calls_by(mission_s)
         if calls > self._calls:
             self._calls = calls
             self._path.CopyFrom(shapes.path(self._plan, calls, self._height_m))

@@ -81,8 +81,7 @@ def _ring(paint: Color) -> LinePrimitive:
 
 def path(plan: Plan, calls: int, height_m: float) -> SceneEntity:
     """The legs as they are known after so many emergency calls: those that a call cut short, and what lies ahead."""
-    ahead = plan.known[calls]
-    past = [segment for segment in plan.segments if segment.begins_s < ahead[0].begins_s]
+    past, ahead = plan.legs(calls)
     entity = SceneEntity(frame_id=SWARM, id="path", frame_locked=True)
     entity.lines.extend(_legs(past, ahead, height_m))
     for number, segment in enumerate((*past, *ahead), start=1):
@@ -90,7 +89,7 @@ def path(plan: Plan, calls: int, height_m: float) -> SceneEntity:
     return entity
 
 
-def _legs(past: list[Segment], ahead: tuple[Segment, ...], height_m: float) -> Iterator[LinePrimitive]:
+def _legs(past: tuple[Segment, ...], ahead: tuple[Segment, ...], height_m: float) -> Iterator[LinePrimitive]:
     flown = [(segment.start_ne, segment.end_ne) for segment in (*past, *ahead)]
     cut = [(leg.end_ne, leg.planned_end_ne) for leg in past if not np.allclose(leg.end_ne, leg.planned_end_ne)]
     for legs, opacity in ((flown, 1.0), (cut, FADED)):

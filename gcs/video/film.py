@@ -14,7 +14,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from gcs.recording.history import History
 from gcs.video.encoder import Encoder
 from gcs.video.flock import Flock
-from gcs.video.ground import ground, named
+from gcs.video.ground import course, grid, names, scale
 from gcs.video.insight import Insight
 from gcs.video.legend import legend
 from gcs.video.motion import Motion
@@ -46,10 +46,14 @@ def film(history: History, path: Path, program: str, *, blind: bool, speed: floa
 
 def unexplained(motion: Motion, times_s: Array) -> Iterator[memoryview]:
     """Motion and nothing else, one picture at a time; each is good until the next."""
-    view = View.of(motion, Box(0, 0, WIDTH, HEIGHT))
-    flock, stage = Flock(motion, view), Stage(ground(view, motion.plan))
+    view = View.planned(motion, Box(0, 0, WIDTH, HEIGHT))
+    flock, stage = Flock(motion, view), Stage([grid(view)])
     colours = np.tile(ANY_ROBOT, (motion.place_ne.shape[1], 1))
+    calls = None
     for time_s in times_s.tolist():
+        if calls != motion.calls_by(time_s):
+            calls = motion.calls_by(time_s)
+            stage.lay(1, course(view, motion.plan, calls))
         yield stage.picture(flock.show(time_s, colours))
 
 
@@ -59,16 +63,19 @@ def explained(history: History, motion: Motion, times_s: Array) -> Iterator[memo
     flock = Flock(motion, view)
     insight = Insight(history, flock, view)
     panel = Panel(history, insight, motion.tick_at(motion.begins_s), Box(WIDTH - PANEL_PX, 0, WIDTH, HEIGHT))
-    stage = Stage([*ground(view, motion.plan), *named(view, motion.plan), *legend(insight), *panel.ground()])
-    news = at = None
+    stage = Stage([grid(view), *scale(view), *legend(insight), *panel.ground()])
+    calls = news = at = None
     for time_s in times_s.tolist():
         tick = motion.tick_at(time_s)
+        if calls != motion.calls_by(time_s):
+            calls, news, at = motion.calls_by(time_s), None, None
+            stage.lay(1, [*course(view, motion.plan, calls), *names(view, motion.plan, calls)])
         if news != panel.news(tick):
             news, at = panel.news(tick), None
-            stage.lay(1, panel.told(tick))
+            stage.lay(2, panel.told(tick))
         if at != tick:
             at = tick
-            stage.lay(2, panel.gauges(tick))
+            stage.lay(3, panel.gauges(tick))
         yield stage.picture(_moving(flock, insight, time_s, tick))
 
 

@@ -1,4 +1,4 @@
-"""What of the map never moves: a grid, the planned path, its targets; and for those who may know, names and scale."""
+"""The map under the robots: a grid, the path and targets known so far; and for those who may know, names and scale."""
 
 from __future__ import annotations
 
@@ -26,24 +26,29 @@ PAST_THE_MIDDLE = 0.6
 """Of the box: a target further right has its name on its left."""
 
 
-def ground(view: View, plan: Plan | None) -> Iterator[Artist]:
-    """Grid, path and targets."""
-    yield _grid(view)
+def course(view: View, plan: Plan | None, calls: int) -> Iterator[Artist]:
+    """Path and targets as they are known after so many emergency calls."""
     if plan is None:
         return
-    flown = [view.pixels([segment.start_ne, segment.end_ne]) for segment in plan.segments]
+    past, ahead = plan.legs(calls)
+    flown = [view.pixels([segment.start_ne, segment.end_ne]) for segment in (*past, *ahead)]
     yield lines(flown, PATH, 2.0, linestyles=[(0, (5, 4))])
-    for segment in plan.segments:
+    for segment in past:
         if not np.allclose(segment.end_ne, segment.planned_end_ne):
             yield lines([view.pixels([segment.end_ne, segment.planned_end_ne])], PATH, 1.2, linestyles=[(0, (1, 4))])
-    yield shapes([_target(view.pixels(s.planned_end_ne)) for s in plan.segments], TARGET, TARGET_EDGE, 2.0)
+    yield shapes([_target(view.pixels(s.planned_end_ne)) for s in (*past, *ahead)], TARGET, TARGET_EDGE, 2.0)
 
 
-def named(view: View, plan: Plan | None) -> Iterator[Artist]:
-    """What each target is, how long ten metres are, and where north is."""
+def names(view: View, plan: Plan | None, calls: int) -> Iterator[Artist]:
+    """What each target is that is known after so many emergency calls."""
     if plan is not None:
-        for number, segment in enumerate(plan.segments, start=1):
+        past, ahead = plan.legs(calls)
+        for number, segment in enumerate((*past, *ahead), start=1):
             yield from _name(view, segment.planned_end_ne, number, segment.task)
+
+
+def scale(view: View) -> Iterator[Artist]:
+    """How long ten metres are, and where north is."""
     right, top = view.box.right - 26.0, view.box.top - 24.0
     yield lines([[(right, top - 42), (right, top - 4)]], DARK, 2.0)
     yield shapes([Path(np.array([(right, top), (right - 6, top - 14), (right + 6, top - 14)]))], DARK)
@@ -65,7 +70,8 @@ def _name(view: View, place_ne: Array, number: int, task: str) -> Iterator[Artis
     yield words(right + sign * BESIDE_PX, up - 12.0, task, size=13, ha=side, weight="bold")
 
 
-def _grid(view: View) -> Artist:
+def grid(view: View) -> Artist:
+    """A square every GRID_M."""
     south, west, north, east = view.edges_ne
     norths, easts = (
         np.arange(np.ceil(a / GRID_M), np.floor(b / GRID_M) + 1) * GRID_M for a, b in ((south, north), (west, east))

@@ -35,6 +35,8 @@ class Motion:
     begins_s: float
     """Of the film, as time_s."""
     ends_s: float
+    starts_s: float
+    """When the mission starts, as time_s; NaN where it never did."""
 
     @staticmethod
     def of(history: History) -> Motion:
@@ -42,12 +44,17 @@ class Motion:
         time_s = (history.time_ns - history.time_ns[0]) / 1e9
         flown = np.flatnonzero(np.isfinite(history.mission_s))
         path = plan(history.scenario) if flown.size else None
-        begins_s, ends_s = 0.0, float(time_s[-1])
+        begins_s, ends_s, start_s = 0.0, float(time_s[-1]), math.nan
         if path is not None:
             start_s = float(time_s[flown[0]] - history.mission_s[flown[0]])
             read_out_s = start_s + min(path.read_out_s, float(history.mission_s[flown[-1]]))
             begins_s, ends_s = max(begins_s, start_s - BEFORE_S), min(ends_s, read_out_s + AFTER_S)
-        return Motion(time_s, history.position[..., :2], _turning(history.attitude_rpy[..., 2]), path, begins_s, ends_s)
+        place_ne, yaw = history.position[..., :2], _turning(history.attitude_rpy[..., 2])
+        return Motion(time_s, place_ne, yaw, path, begins_s, ends_s, start_s)
+
+    def calls_by(self, time_s: float) -> int:
+        """How many emergency calls have come."""
+        return 0 if self.plan is None else self.plan.calls_by(time_s - self.starts_s)
 
     def tick_at(self, time_s: float) -> int:
         """The last tick that is not later."""

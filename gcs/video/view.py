@@ -15,6 +15,8 @@ WIDTH, HEIGHT, RATE = 1280, 720, 30
 """Of every film: pixels, and pictures a second."""
 MARGIN = 62.0
 """Pixels round everything that is flown."""
+ASTRAY_M = 20.0
+"""Round the planned path of a blind film: the paper's worst flights keep within it."""
 LEAST_M = 12.0
 """A flight that goes nowhere is not looked at more closely than this."""
 
@@ -44,16 +46,25 @@ class View:
     def of(motion: Motion, box: Box) -> View:
         """What holds every robot while the film goes on, and the planned path."""
         flown = motion.place_ne[motion.ticks(motion.begins_s, motion.ends_s)].reshape(-1, 2)
-        places = [flown[np.isfinite(flown).all(axis=1)]]
-        for segment in motion.plan.segments if motion.plan is not None else ():
-            places += [segment.start_ne[None], segment.planned_end_ne[None]]
-        every = np.concatenate(places)
-        every = every if len(every) else np.zeros((1, 2))
+        places = np.concatenate([flown[np.isfinite(flown).all(axis=1)], _planned(motion)])
+        return View._round(places, box, margin_px=MARGIN)
+
+    @staticmethod
+    def planned(motion: Motion, box: Box) -> View:
+        """What holds the planned path and ASTRAY_M round it: the same for all flights of one plan, whoever flew it."""
+        if motion.plan is None:
+            return View.of(motion, box)
+        return View._round(np.concatenate([_planned(motion) + apart for apart in (-ASTRAY_M, ASTRAY_M)]), box)
+
+    @staticmethod
+    def _round(places_ne: Array, box: Box, *, margin_px: float = 0.0) -> View:
+        """What holds these places (P, 2) m."""
+        every = places_ne if len(places_ne) else np.zeros((1, 2))
         low, high = every.min(axis=0), every.max(axis=0)
         north_m, east_m = np.maximum(high - low, LEAST_M)
         scale = min(
-            (box.right - box.left - 2 * MARGIN) / east_m,
-            (box.top - box.bottom - 2 * MARGIN) / north_m,
+            (box.right - box.left - 2 * margin_px) / east_m,
+            (box.top - box.bottom - 2 * margin_px) / north_m,
         )
         north, east = 0.5 * (low + high)
         return View(box, float(scale), (float(north), float(east)))
@@ -74,3 +85,9 @@ class View:
         )
         (north, east), (up, right) = self.centre_ne, half_ne
         return north - up, east - right, north + up, east + right
+
+
+def _planned(motion: Motion) -> Array:
+    """(P, 2) m: where legs begin and would have ended."""
+    segments = () if motion.plan is None else motion.plan.segments
+    return np.array([place for leg in segments for place in (leg.start_ne, leg.planned_end_ne)]).reshape(-1, 2)

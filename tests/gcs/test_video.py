@@ -258,3 +258,28 @@ class TestWhatCannotBe:
         with pytest.raises(KeyboardInterrupt):
             interrupted()
         assert list(tmp_path.iterdir()) == []
+
+
+def around(picture, view, place_ne, pixels=10):
+    """The part of a picture about a place."""
+    right, up = np.round(view.pixels(place_ne)).astype(int)
+    return picture[HEIGHT - up - pixels : HEIGHT - up + pixels, right - pixels : right + pixels]
+
+
+def test_nobody_sees_where_an_emergency_calls_before_it_does():
+    motion = Motion.of(load(recorded("emergency").path))
+    call_s = motion.starts_s + motion.plan.hand_over_s
+    before, after = pictures(unexplained(motion, np.array([call_s - 0.05, call_s + 0.05])))
+    view, (known, called) = View.planned(motion, Box(0, 0, WIDTH, HEIGHT)), motion.plan.segments
+    first, second = known.planned_end_ne, called.planned_end_ne
+    assert around(before, view, first).min() == around(after, view, first).min() < 120
+    assert around(before, view, second).min() > 200
+    assert around(after, view, second).min() < 120
+
+
+def test_a_blind_film_looks_at_the_same_ground_however_the_flight_went():
+    view, other = (
+        View.planned(Motion.of(load(recorded(*name).path)), Box(0, 0, WIDTH, HEIGHT))
+        for name in (("emergency",), ("emergency", 'control.rule="average"'))
+    )
+    assert (view.scale, view.centre_ne) == (other.scale, other.centre_ne)
