@@ -42,13 +42,15 @@ def _of_bars(flights: Sequence[Told]) -> str:
     """What the bars under the plot are, where there are any."""
     if not any(told.history.acted for told in flights):
         return ""
-    planned = " as the scenario has it" if any(told.history.faults_by == "planned" for told in flights) else ""
     knew = "which nobody in the air knew"
     if any(told.trust_source == "truth" for told in flights):
         knew = "which trust from truth is told, and nobody else in the air knew"
+    what = f"the truth, {knew}"
+    if any(told.planned for told in flights):
+        what = "faults as the scenario has them, whether or not the vehicles fly them"
     return (
-        f" The bars under the plot are the truth{planned}, {knew}: while a fault acts on the robot of that number. "
-        "Trust is right where a line is low above its robot's bar, and nowhere else."
+        f" The bars under the plot are {what}: while a fault acts on the robot of that number. Trust is right where a "
+        "line is low above its robot's bar, and nowhere else."
     )
 
 
@@ -111,8 +113,9 @@ def _trust_in_words(told: Told) -> str:
     said += [f"robot {one.system} failed and was trusted" for one in about if one.missed]
     said += [f"robot {one.system} was distrusted at {one.wrongly_s:.1f} s {_without(one)}" for one in wronged]
     if not wronged:
-        said.append("nobody was without a fault" if found else "nobody was distrusted")
-    return capital(f"{some(said, most=MOST_SAID, between='; ')}.")
+        said.append("nobody else was" if found else "nobody was distrusted")
+    by = "by the scenario " if told.planned and told.onsets else ""
+    return capital(f"{by}{some(said, most=MOST_SAID, between='; ')}.")
 
 
 MOST_SAID = 6
@@ -159,10 +162,11 @@ def _strips(told: Told, frame: Frame) -> list[str]:
 
 def _truth_key(flights: Sequence[Told]) -> Iterator[tuple[str, str]]:
     struck = {span.vehicle for told in flights for span in told.history.acted}
+    whose = "scenario" if any(told.planned for told in flights) else "truth"
     if struck - {None}:
-        yield "fault bar", "truth: a fault acts"
+        yield "fault bar", f"{whose}: a fault acts"
     if None in struck:
-        yield "air bar", "truth: it blows on everyone"
+        yield "air bar", f"{whose}: it blows on everyone"
 
 
 def _weights(told: Told, flights: Sequence[Told], share: Array, top: float) -> Drawn:

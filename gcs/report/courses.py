@@ -184,10 +184,11 @@ def _numbers(told: Told, ground: Ground, room: Room, last: Array, seen: Sequence
     for row in seen:
         if told.crowded and told.looks[row] == "healthy":
             continue
-        at, said = np.array(ground.at(last[row])), str(told.history.ids[row])
+        there, said = ground.at(last[row]), str(told.history.ids[row])
+        at = np.array(there)
         away = (at - middle) / max(float(np.hypot(*(at - middle))), 1e-9)
         places = list(about(at, away if np.hypot(*away) > 0.5 else np.array([1.0, 0.0])))
-        x, y, anchor = room.place(said, places, over_lines=True)
+        x, y, anchor = room.place(said, there, places, over_lines=True)
         parts.append(words(x, y, said, f"name {told.looks[row]}", anchor=anchor))
     return parts
 
@@ -220,8 +221,9 @@ def _tasks(told: Told, ground: Ground, room: Room) -> list[str]:
     for segment in reversed(segments if len(segments) <= MOST_TASKS else segments[-1:]):
         task = segment.task
         said = task if len(task) <= LONGEST_TASK else task[: LONGEST_TASK - 1] + "…"
-        places = list(around(*ground.at(segment.planned_end_ne), crowd if segment is segments[-1] else None))
-        x, y, anchor = room.place(said, places)
+        there = ground.at(segment.planned_end_ne)
+        places = list(around(*there, crowd if segment is segments[-1] else None))
+        x, y, anchor = room.place(said, there, places)
         parts.append(words(x, y, said, "task", anchor=anchor))
     return parts
 

@@ -73,7 +73,7 @@ def distance(flights: Sequence[Told]) -> Section:
     return Section(
         "distance",
         "Distance to the target",
-        f"From the target of the leg being flown to {mean_key(flights)[1]}. It jumps when a new target is given; a "
+        f"From the target of the leg being flown to the {mean_key(flights)[1]}. It jumps when a new target is given; a "
         "swarm on its way falls in a straight line and ends below the dashed one.",
         (_mean(flights), *key(flights), ALLOWED),
         tuple(drawn),

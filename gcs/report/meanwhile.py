@@ -11,7 +11,7 @@ import numpy as np
 from gcs.events import Rating
 from gcs.recording.history import Kind
 from gcs.report.distrust import Distrust, distrusts
-from gcs.report.telling import FEW, Sentence, Strand, counted, crowd, listed, some
+from gcs.report.telling import FEW, Sentence, Strand, capital, counted, crowd, listed, some
 from gcs.report.told import Told
 from gcs.words import faults, robots
 
@@ -114,21 +114,25 @@ def _faults(told: Told) -> Iterator[Strand]:
         if planned:
             yield Strand.one(0.0, f"The scenario has {some(planned)}; whether it was so, nobody told.")
         return
-    by = ", as the scenario has it" if told.history.faults_by == "planned" else ""
+    by = "by the scenario" if told.planned else ""
     firsts = {span.words: span.from_s for span in reversed(told.history.acted)}
     from_the_start = [said for said, at_s in firsts.items() if at_s <= 0.0]
     later = sorted((at_s, said) for said, at_s in firsts.items() if at_s > 0.0)
     if from_the_start:
-        untold = "" if told.trust_source == "truth" else ", and no controller was told"
-        yield Strand.one(0.0, f"Something was wrong from the start{untold}: {some(from_the_start)}{by}.")
+        untold = "" if told.trust_source == "truth" or told.planned else ", and no controller was told"
+        begins = capital(f"{by} something was wrong".strip())
+        tells = "; whether the vehicles flew so, they do not tell" if told.planned else ""
+        yield Strand.one(0.0, f"{begins} from the start{untold}: {some(from_the_start)}{tells}.")
     if later:
-        sentences = (Sentence(at_s, f"At {at_s:.1f} s something went wrong: {said}{by}.") for at_s, said in later)
+        by = f", {by}," if by else ""
+        sentences = (Sentence(at_s, f"At {at_s:.1f} s{by} something went wrong: {said}.") for at_s, said in later)
         number = f"{len(later)}{' more' if from_the_start else ''} things"
         what = some([said for _, said in later])
-        in_sum = f"{_span([at_s for at_s, _ in later])} {number} went wrong: {what}{by}."
+        in_sum = f"{_span([at_s for at_s, _ in later])}{by} {number} went wrong: {what}."
         yield Strand(tuple(sentences), Sentence(later[0][0], in_sum))
     if not firsts:
-        yield Strand.one(0.0, f"Nothing was wrong with anybody{by}.", spared="that nothing was wrong")
+        said = capital(f"{by} nothing was wrong with anybody.".strip())
+        yield Strand.one(0.0, said, spared="that nothing was wrong")
 
 
 def _distrust(told: Told) -> Iterator[Strand]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -19,6 +20,8 @@ BESIDE = 12.0
 """Units from a thing to the words beside it."""
 HEAVY = 1000
 """Points of lines that a mark or another word counts for."""
+FAR = 1.0
+"""Points of lines that a unit of distance counts for."""
 OUTSIDE = 10**6
 """Worse than to cover all that is drawn."""
 
@@ -35,9 +38,17 @@ class Room:
         """Nothing else is to stand there."""
         self._boxes.append(box)
 
-    def place(self, said: str, places: Sequence[Place], *, over_lines: bool = False) -> Place:
-        """The first of the places that cover least, which is then taken. over_lines: lines do not matter."""
-        best = min(places, key=lambda place: self._covered(box_of(said, place), over_lines=over_lines))
+    def place(self, said: str, at: tuple[float, float], places: Sequence[Place], *, over_lines: bool = False) -> Place:
+        """The first of the places that cover least and are not far from what they name, which is then taken.
+
+        at: across and down of what is named;  over_lines: lines do not matter.
+        """
+
+        def cost(place: Place) -> float:
+            box = box_of(said, place)
+            return self._covered(box, over_lines=over_lines) + FAR * _distance(at, box)
+
+        best = min(places, key=cost)
         self.take(box_of(said, best))
         return best
 
@@ -58,6 +69,12 @@ def box_of(said: str, place: Place) -> Box:
     width = LETTER * len(said)
     left = across - width * {"start": 0.0, "middle": 0.5, "end": 1.0}[anchor]
     return left - 2.0, base - TEXT, left + width + 2.0, base + 4.0
+
+
+def _distance(at: tuple[float, float], box: Box) -> float:
+    """From a point to the nearest edge, 0 inside."""
+    (x, y), (left, top, right, bottom) = at, box
+    return math.hypot(max(left - x, 0.0, x - right), max(top - y, 0.0, y - bottom))
 
 
 def overlap(one: Box, other: Box) -> bool:

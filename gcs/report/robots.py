@@ -51,9 +51,10 @@ def key(flights: Sequence[Told]) -> tuple[tuple[str, str], ...]:
     known = all(told.faults_known for told in flights)
     every = "each healthy robot" if known else "each robot"
     all_ = "all healthy robots" if known else "all robots"
+    failed = "failed robot, by the scenario" if any(told.planned for told in flights) else "failed robot"
     drawn = (
         ("healthy", "robot healthy", every),
-        ("failed", "robot failed", "failed robot"),
+        ("failed", "robot failed", failed),
         ("doubted", "robot doubted", "healthy, but distrusted" if known else "distrusted"),
     )
     if any(told.crowded for told in flights):

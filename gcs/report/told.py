@@ -84,6 +84,11 @@ class Told:
         """Whether it is known what was wrong, be it that the scenario is taken at its word."""
         return self.history.faults_by != "unknown"
 
+    @property
+    def planned(self) -> bool:
+        """Whether what was wrong is the scenario's word alone, for vehicles that somebody else started."""
+        return self.history.faults_by == "planned"
+
     @cached_property
     def onsets(self) -> Mapping[int, float]:
         """System id → when the first of its faults began, of those that acted; nobody where that is not known."""

@@ -105,7 +105,7 @@ def _wrong(told: Told) -> Cell:
     acted = list(dict.fromkeys(span.words for span in told.history.acted))
     return Cell(
         some(acted, most=MOST_FAULTS, between="; ") if acted else "nothing",
-        "as the scenario has it" if told.history.faults_by == "planned" else "",
+        "by the scenario" if told.planned else "",
     )
 
 
@@ -138,7 +138,8 @@ def _distrusted(told: Told) -> Cell:
     wrongly = sum(one.wronged for one in about)
     notes = [f"never: {robots(missed)}"] if missed else []
     notes.append(counted(wrongly, "false alarm") if wrongly else "no false alarm")
-    mark = FAILED if missed or wrongly else PASSED if found else NEITHER
+    notes += ["by the scenario"] if told.planned else []
+    mark = NEITHER if told.planned else FAILED if missed or wrongly else PASSED if found else NEITHER
     return Cell("; ".join(found) or "nobody", ", ".join(notes), mark)
 
 
@@ -163,7 +164,7 @@ def robot_by_robot(told: Told) -> Table:
         part = "left behind" if system in parts.left_behind else "leader" if system in parts.leaders else "follower"
         look = "" if told.looks[row] == "healthy" else told.looks[row]
         figures = (
-            Cell(part, look, FAILED if look == "failed" else NEITHER),
+            Cell(part, look, FAILED if look == "failed" and not told.planned else NEITHER),
             _figure(_least(trust[:, row]), ".2f"),
             _figure(_last(trust[:, row]), ".2f"),
             _figure(_last(share[:, row]), ".1%"),

@@ -52,6 +52,7 @@ FLIGHTS = {
     "slandered": slandered,
     "blind": blind,
     "cut short": cut_short,
+    "planned": lambda: replace(blind(), faults_by="planned"),
     "live": lambda: live(dragged(2, 3)),
     "unreached": unreached,
 }
@@ -124,3 +125,12 @@ def test_what_is_called_wrong_is_the_same_in_the_story_and_the_table(told):
         assert cell.said == "nothing" or cell.said in said
     else:
         assert cell.said == "nothing"
+
+
+def test_a_fault_that_is_the_scenarios_word_alone_condemns_nobody():
+    told = Told("a flight", replace(blind(), faults_by="planned"))
+    cell = dict(zip(verdicts([told]).headings[1:], verdicts([told]).rows[0].cells, strict=True))["distrusted after"]
+    assert (cell.note, cell.mark) == ("never: robot 5, no false alarm, by the scenario", "")
+    drawn = trust([told])
+    assert drawn.charts[0].words == "By the scenario robot 5 failed and was trusted; nobody was distrusted."
+    assert "truth" not in f"{drawn.look_for} {drawn.legend}"

@@ -113,7 +113,7 @@ def test_a_fault_that_nobody_saw_act_is_the_scenarios_alone():
     assert "At 2.0 s robot 5 was distrusted." in said
     assert "wrong" not in said.replace("went wrong", "")
     planned = told(replace(dragged(2, 3), faults_by="planned"))
-    assert "robot 5 at 40% speed, as the scenario has it." in planned
+    assert "By the scenario something was wrong from the start: robot 5 at 40% speed; whether the vehicles" in planned
 
 
 def test_what_the_failed_count_for_is_told_of_all_of_them_together():
