@@ -10,7 +10,7 @@ from itertools import count
 
 from gcs.choices import BadUsageError
 from gcs.console import say
-from gcs.replay.outputs import Message
+from gcs.replay.outputs import Played
 
 try:
     from foxglove import Channel, Context, Schema, start_server
@@ -48,7 +48,7 @@ class FoxgloveOutput:
         """Where it listens."""
         say(f"Foxglove connects to ws://{HOST}:{self.port}; raw MAVLink frames, which it cannot read, are left out")
 
-    def put(self, messages: Sequence[Message]) -> None:
+    def put(self, messages: Sequence[Played]) -> None:
         """To whoever has subscribed to their topics; and what time it is."""
         for message in messages:
             if message.encoding != UNREADABLE:
@@ -65,7 +65,7 @@ class FoxgloveOutput:
         """Viewers are told that the server goes."""
         self._server.stop()
 
-    def _channel(self, message: Message) -> Channel:
+    def _channel(self, message: Played) -> Channel:
         """Of its topic; made, and so told to viewers, when its first message is due."""
         channel = self._channels.get(message.topic)
         if channel is None:

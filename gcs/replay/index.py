@@ -24,7 +24,7 @@ _ENTRIES = struct.Struct("<HI")
 
 
 @dataclass(frozen=True, slots=True)
-class Gap:
+class Silence:
     """A time without messages."""
 
     begin_ns: int
@@ -57,7 +57,7 @@ def _indexes(block: bytes) -> Iterator[tuple[int, Times]]:
         at += length
 
 
-def gaps(heard: Mapping[int, Times]) -> tuple[Gap, ...]:
+def silences(heard: Mapping[int, Times]) -> tuple[Silence, ...]:
     """Where nobody was heard, and where each was not; heard: system id → times, ns, ascending.
 
     A vehicle is silent, too, while others are heard already, or still.
@@ -65,13 +65,13 @@ def gaps(heard: Mapping[int, Times]) -> tuple[Gap, ...]:
     if not heard:
         return ()
     everybody = np.sort(np.concatenate(list(heard.values())))
-    found = [Gap(*span, None) for span in _silences(everybody)]
+    found = [Silence(*span, None) for span in _spans(everybody)]
     for system, own in heard.items():
         there = np.concatenate([everybody[:1], own, everybody[-1:]])
-        found += [Gap(*span, system) for span in _silences(there)]
+        found += [Silence(*span, system) for span in _spans(there)]
     return tuple(found)
 
 
-def _silences(heard: Times) -> Iterator[tuple[int, int]]:
+def _spans(heard: Times) -> Iterator[tuple[int, int]]:
     rows = np.flatnonzero(np.diff(heard) > GAP_NS)
     yield from zip(heard[rows].tolist(), heard[rows + 1].tolist(), strict=True)

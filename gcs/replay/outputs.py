@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 
-class Message(NamedTuple):
+class Played(NamedTuple):
     """One message as it was recorded."""
 
     time_ns: int
@@ -24,7 +24,7 @@ class Message(NamedTuple):
 class Output(Protocol):
     """Somebody who is to see the flight again; no method waits."""
 
-    def put(self, messages: Sequence[Message]) -> None:
+    def put(self, messages: Sequence[Played]) -> None:
         """These are due now, in this order: backwards where the flight is played backwards."""
         ...
 

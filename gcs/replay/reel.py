@@ -12,7 +12,7 @@ from mcap.records import Channel, Schema
 from mcap.records import Message as Record
 
 from gcs.recording.reader import RECORD_SIZE_LIMIT, readable
-from gcs.replay.outputs import Message
+from gcs.replay.outputs import Played
 from gcs.replay.player import Span
 
 Read = tuple[Schema | None, Channel, Record]
@@ -29,7 +29,7 @@ class Reel:
             self._reader = SeekingReader(stream, validate_crcs=True, record_size_limit=RECORD_SIZE_LIMIT)
             self._open = opened.pop_all()
         self._coming: Iterator[Read] = iter(())
-        self._next: Message | None = None
+        self._next: Played | None = None
         self._at_ns: int | None = None
         """Where the last span ended; None before the first."""
         self._backwards = False
@@ -42,14 +42,14 @@ class Reel:
     ) -> None:
         self._open.close()
 
-    def play(self, span: Span) -> list[Message]:
+    def play(self, span: Span) -> list[Played]:
         """What lies there, in the order of playing. Raises UnreadableRecording where the file is damaged there."""
         if span.begin_ns == span.end_ns:
             return []
         with readable(self._path):
             return list(self._played(span, backwards=span.end_ns < span.begin_ns))
 
-    def _played(self, span: Span, *, backwards: bool) -> Iterator[Message]:
+    def _played(self, span: Span, *, backwards: bool) -> Iterator[Played]:
         if (span.begin_ns, backwards) != (self._at_ns, self._backwards):
             self._turn(span.begin_ns, backwards=backwards)
         while (message := self._next) is not None:
@@ -68,10 +68,10 @@ class Reel:
         self._at_ns, self._backwards = None, backwards
         self._next = self._read()
 
-    def _read(self) -> Message | None:
+    def _read(self) -> Played | None:
         read = next(self._coming, None)
         if read is None:
             return None
         schema, channel, record = read
         of_schema = ("", "", b"") if schema is None else (schema.name, schema.encoding, schema.data)
-        return Message(record.log_time, channel.topic, channel.message_encoding, *of_schema, record.data)
+        return Played(record.log_time, channel.topic, channel.message_encoding, *of_schema, record.data)

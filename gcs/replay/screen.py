@@ -138,7 +138,9 @@ def _state(timeline: Timeline, player: Player, view: View) -> Text:
     text.append(view.phase, style="cyan")
     if view.task and view.phase == Phase.MISSION.value:
         text.append(f" · {view.task}")
-    silent = [gap.vehicle for gap in timeline.gaps if gap.begin_ns < player.position_ns <= gap.end_ns]
+    silent = [
+        silence.vehicle for silence in timeline.silences if silence.begin_ns < player.position_ns <= silence.end_ns
+    ]
     if None in silent:
         text.append("   nobody is heard", style="yellow")
     elif silent:

@@ -19,7 +19,7 @@ from gcs.recording import history as flights
 from gcs.recording.files import SCENARIO
 from gcs.recording.history import Happening, History, Kind
 from gcs.recording.reader import RECORD_SIZE_LIMIT, UnreadableRecording, located, readable
-from gcs.replay.index import Gap, gaps, times
+from gcs.replay.index import Silence, silences, times
 from gcs.replay.senders import Senders, sender, senders
 from wire.ids import AUTOPILOT
 
@@ -51,7 +51,7 @@ class Timeline:
     flight: History | None
     """None of what was imported."""
     senders: Senders
-    gaps: tuple[Gap, ...]
+    silences: tuple[Silence, ...]
 
     @cached_property
     def mission_ns(self) -> int | None:
@@ -136,5 +136,5 @@ def load(path: Path) -> Timeline:
         end_ns=max(chunk.message_end_time for chunk in summary.chunk_indexes) + 1,
         flight=flights.load(path) if ours else None,
         senders=spoke,
-        gaps=gaps({system: autopilots[system] for system in spoke.vehicles if system in autopilots}),
+        silences=silences({system: autopilots[system] for system in spoke.vehicles if system in autopilots}),
     )

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from gcs.choices import BadUsageError
-from gcs.replay.outputs import Message
+from gcs.replay.outputs import Played
 from gcs.replay.senders import Senders
 from wire.connection import Connection, ConnectionRefused, parse
 from wire.frames import Frame, Framer
@@ -99,7 +99,7 @@ class UdpOutput:
             raise BadUsageError(f"--to {error}") from None
         self._framer = Framer()
 
-    def put(self, messages: Sequence[Message]) -> None:
+    def put(self, messages: Sequence[Played]) -> None:
         """Each frame of a vehicle in a datagram of its own, as it was recorded; one that nobody takes is gone."""
         self._port.receive()
         for message in messages:

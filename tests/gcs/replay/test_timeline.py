@@ -9,7 +9,7 @@ from gcs.choices import BadUsageError
 from gcs.recording.mcap_file import McapFile
 from gcs.recording.reader import UnreadableRecording
 from gcs.replay import timeline
-from gcs.replay.index import Gap, gaps
+from gcs.replay.index import Silence, silences
 
 SECOND = 1_000_000_000
 
@@ -95,7 +95,7 @@ def test_where_nobody_or_a_vehicle_was_silent_is_known():
 
     path = frames_alone(recorded("demo", *SHORT).path, keep=keep)
     found = timeline.load(path)
-    silent = [(gap.vehicle, found.seconds(gap.begin_ns), found.seconds(gap.end_ns)) for gap in found.gaps]
+    silent = [(gap.vehicle, found.seconds(gap.begin_ns), found.seconds(gap.end_ns)) for gap in found.silences]
     everybody = [(begin, end) for vehicle, begin, end in silent if vehicle is None]
     assert everybody == [(pytest.approx(4.0, abs=0.2), pytest.approx(7.0, abs=0.2))]
     assert {vehicle for vehicle, begin, _ in silent if begin < 6.0} == {None, 1, 2, 3, 4, 5, 6}
@@ -104,15 +104,15 @@ def test_where_nobody_or_a_vehicle_was_silent_is_known():
 
 
 def test_a_flight_without_silence_has_no_gaps(flight):
-    assert flight.gaps == ()
+    assert flight.silences == ()
 
 
 def test_gaps_are_longer_than_the_time_between_two_beats():
     beats = np.array([0, 1, 2, 5, 6], np.int64) * SECOND
-    assert gaps({}) == ()
-    assert gaps({7: beats}) == (Gap(2 * SECOND, 5 * SECOND, None), Gap(2 * SECOND, 5 * SECOND, 7))
+    assert silences({}) == ()
+    assert silences({7: beats}) == (Silence(2 * SECOND, 5 * SECOND, None), Silence(2 * SECOND, 5 * SECOND, 7))
     always = np.arange(7, dtype=np.int64) * SECOND
-    assert gaps({1: always, 2: always[3:]}) == (Gap(0, 3 * SECOND, 2),)
+    assert silences({1: always, 2: always[3:]}) == (Silence(0, 3 * SECOND, 2),)
 
 
 def test_a_torn_recording_is_refused_with_what_rebuilds_it():

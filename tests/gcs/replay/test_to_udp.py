@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from gcs.choices import BadUsageError
 from gcs.replay import timeline
-from gcs.replay.outputs import Message
+from gcs.replay.outputs import Played
 from gcs.replay.senders import Senders
 from gcs.replay.to_udp import TELEMETRY, UdpOutput, checked, may_leave
 from wire.connection import Connection
@@ -100,7 +100,7 @@ def put_out(path, station):
     with closing(UdpOutput(connection, timeline.load(path).senders)) as output:
         for topic, time_ns, data in recording:
             encoding = "mavlink" if topic.endswith("/raw") else "json"
-            output.put([Message(time_ns, topic, encoding, "", "", b"", data)])
+            output.put([Played(time_ns, topic, encoding, "", "", b"", data)])
             arrived += drained(heard)
         assert output.sent == len(arrived)
     return recording, arrived
@@ -124,7 +124,7 @@ def test_of_another_ground_stations_log_what_that_station_sent_stays_behind(stat
 def test_what_comes_back_is_thrown_away_and_nobody_listening_is_no_reason_to_fail(station):
     heard, connection = station
     beat = framed("HEARTBEAT", type=dialect.MAV_TYPE_QUADROTOR).raw
-    one = [Message(0, "/mavlink/1_1/raw", "mavlink", "", "", b"", beat)]
+    one = [Played(0, "/mavlink/1_1/raw", "mavlink", "", "", b"", beat)]
     with closing(UdpOutput(connection, SENDERS)) as output:
         output.put(one)
         data, sender = heard.recvfrom(2048)
@@ -146,7 +146,7 @@ def test_a_refusal_of_what_was_sent_before_somebody_listened_loses_nothing_that_
     heard.close()
     beat = framed("HEARTBEAT", type=dialect.MAV_TYPE_QUADROTOR).raw
     with closing(UdpOutput(connection, SENDERS)) as output, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as late:
-        output.put([Message(0, "/mavlink/1_1/raw", "mavlink", "", "", b"", beat)])
+        output.put([Played(0, "/mavlink/1_1/raw", "mavlink", "", "", b"", beat)])
         late.bind(address)
         late.setblocking(False)
         output._left(beat)
@@ -157,7 +157,7 @@ def test_what_vehicles_sent_and_is_held_back_is_counted_by_its_name(station):
     _, connection = station
     frames = [framed("SYSTEM_TIME"), framed("SYSTEM_TIME"), framed("COMMAND_LONG"), framed("HEARTBEAT", 255, 190)]
     with closing(UdpOutput(connection, SENDERS)) as output:
-        output.put([Message(0, "/mavlink/1_1/raw", "mavlink", "", "", b"", frame.raw) for frame in frames])
+        output.put([Played(0, "/mavlink/1_1/raw", "mavlink", "", "", b"", frame.raw) for frame in frames])
         assert output.held_back == {"SYSTEM_TIME": 2, "COMMAND_LONG": 1}
         assert output.sent == 0
 
