@@ -12,7 +12,7 @@ from gcs.events import Rating
 from gcs.recording.reader import ticks
 from gcs.supervision import NOBODY, Supervision
 from gcs.to_fly import to_fly
-from gcs.versions import installed, others
+from gcs.versions import installed, others, sources
 
 BRIEF = ("demo", *SHORT)
 AVERAGE, FUSED = 'control.rule="average"', 'trust.source="fused"'
@@ -139,6 +139,25 @@ def test_versions_that_differ_are_named():
     assert list(others(here)) == []
     assert list(others(here | {"jsbsim": "0.1"})) == [f"jsbsim 0.1 (here {here['jsbsim']})"]
     assert list(others({"scenario": "demo"})) == []
+    assert list(others(here | {"machine": "pdp11"})) == [f"machine pdp11 (here {here['machine']})"]
+    assert list(others(here | {"sources": "0"})) == [f"sources 0 (here {here['sources']})"]
+    assert {"lz4", "orjson", "protobuf"} < here.keys()
+    assert "absent" not in here.values()
+
+
+def test_our_own_version_is_another_when_any_file_of_ours_is(tmp_path):
+    files = {"gcs/loop.py": b"1", "gcs/report/page.html": b"", "aircraft/quad.xml": b"<q/>"}
+    fingerprint, fingerprints = sources.__wrapped__, set()
+    for at, changed in enumerate((None, *files)):
+        root = tmp_path / str(at)
+        for name, content in files.items():
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_bytes(content + b" " * (name == changed))
+        fingerprints.add(fingerprint(root))
+        (root / "gcs" / "__pycache__").mkdir()
+        (root / "gcs" / "__pycache__" / "loop.pyc").write_bytes(b"2")
+        assert fingerprint(root) in fingerprints
+    assert len(fingerprints) == 4
 
 
 def test_ticks_that_a_damaged_recording_lacks_are_said_to_be_silent():
