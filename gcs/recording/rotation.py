@@ -9,35 +9,21 @@ written ────────────────────────
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from gcs.recording.channels import Channels, Message
 from gcs.recording.files import DROPPED, METADATA, PART, SCENARIO, RecordingError, part
 from gcs.recording.mcap_file import McapFile
 from gcs.recording.seal import sealed
+from gcs.words import missing
 
 AGAIN_NS = 1_000_000_000
 """Between two attempts to go on."""
 ENOUGH = 1 << 20
 """Bytes that must be free to go on, so that it does not stop again at once."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Channel:
-    """What a topic's messages are, in whichever file they are written."""
-
-    topic: str
-    encoding: str
-    schema_name: str = ""
-    """Empty where the encoding speaks for itself."""
-    schema_encoding: str = ""
-    schema: bytes = b""
-
-
-Message = tuple[Channel, int, bytes]
-"""With its time, ns since 1970, and its payload."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,13 +44,12 @@ class Rotation:
         self._path, self._about, self._say = path, about, say
         self._file: McapFile | None = None
         """None while the disk takes nothing."""
+        self._channels: Channels
+        """Of this part."""
         self._number = 0
         """Of the last part that the disk took messages of, or that it began with."""
         self._attempted = False
         """Whether the file is the part behind that, of which the disk took none yet."""
-        self._ids: dict[Channel, int] = {}
-        """Of the channels that this part knows."""
-        self._schemas: dict[str, int] = {}
         self._ended: list[McapFile] = []
         """Parts that still lack their summary."""
         self._tried_ns = about.start_ns
@@ -84,18 +69,18 @@ class Rotation:
         if self._why is None:
             return None
         on = f"; it goes on in {part(self._path, self._number).name}" if self._number > 1 else ""
-        return f"{self._path}: the recording stopped: {self._why}; {self.dropped} messages are missing{on}"
+        return f"{self._path}: the recording stopped: {self._why}; {missing(self.dropped, 'message')}{on}"
 
-    def add(self, messages: Sequence[Message]) -> None:
+    def add(self, messages: Iterable[Message]) -> None:
         """In their order; lost, and counted, while the disk takes nothing."""
-        file, ids = self._file, self._ids
+        file = self._file
         if file is None:
-            self.dropped += len(messages)
+            self.dropped += sum(1 for _ in messages)
             return
+        number = self._channels.number
+        numbered = [(number(channel), time_ns, data) for channel, time_ns, data in messages]
         try:
-            file.extend(
-                [(ids.get(kind) or self._define(file, kind), time_ns, data) for kind, time_ns, data in messages]
-            )
+            file.extend(numbered)
         except OSError as error:
             self._stop(file, error)
 
@@ -127,28 +112,19 @@ class Rotation:
         self._file, self._ended = None, []
 
     def _open(self) -> None:
-        """Begin the next part. Raises OSError."""
+        """Begin the next part, in nobody's place. Raises OSError."""
         path = part(self._path, self._number + 1)
-        file = McapFile(path)
+        path.touch(exist_ok=False)
+        file = None
         try:
+            file = McapFile(path)
             words = {PART: str(self._number + 1), DROPPED: str(self.dropped)}
             file.metadata(METADATA, sealed(METADATA, self._about.metadata | words))
             file.attach(self._about.start_ns, SCENARIO, "application/json", self._about.scenario)
         except OSError:
             _discard(file, path)
             raise
-        self._file, self._ids, self._schemas = file, {}, {}
-
-    def _define(self, file: McapFile, channel: Channel) -> int:
-        schema = 0
-        if channel.schema_name:
-            if channel.schema_name not in self._schemas:
-                self._schemas[channel.schema_name] = file.schema(
-                    channel.schema_name, channel.schema_encoding, channel.schema
-                )
-            schema = self._schemas[channel.schema_name]
-        number = self._ids[channel] = file.channel(channel.topic, channel.encoding, schema)
-        return number
+        self._file, self._channels = file, Channels(file)
 
     def _attempt(self, write: Callable[[McapFile], None]) -> None:
         if self._file is None:
@@ -162,7 +138,7 @@ class Rotation:
             self._attempted = False
             self._number += 1
             now = part(self._path, self._number)
-            self._say(f"gcs: {now}: the recording goes on; {self.dropped} messages are missing")
+            self._say(f"gcs: {now}: the recording goes on; {missing(self.dropped, 'message')}")
             self._finish_ended()
 
     def _stop(self, file: McapFile, error: OSError) -> None:
@@ -190,7 +166,8 @@ class Rotation:
         self._ended = waiting
 
 
-def _discard(file: McapFile, path: Path) -> None:
-    file.close()
+def _discard(file: McapFile | None, path: Path) -> None:
+    if file is not None:
+        file.close()
     with suppress(OSError):
         path.unlink()

@@ -19,11 +19,10 @@ from mcap_protobuf.schema import build_file_descriptor_set
 from gcs import console
 from gcs.loop import Clock, Link, Tick
 from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
-from gcs.recording import topics
-from gcs.recording.decoded import SCHEMA, decoded, schema
-from gcs.recording.decoded import topic as decoded_topic
+from gcs.recording import decoded, topics
+from gcs.recording.channels import Channel, Message, raw_channel
 from gcs.recording.own_topics import OwnTopics, Pose, pose_of, tick_topic
-from gcs.recording.rotation import About, Channel, Message, Rotation
+from gcs.recording.rotation import About, Rotation
 from gcs.recording.viewers import Viewers
 from gcs.shielded import in_words
 from gcs.summary import Reception
@@ -154,22 +153,22 @@ class Recorder:
     def _frames(self, passed: Passed) -> list[Message]:
         """In the order in which they passed: what came, then what went."""
         came, went = passed
-        ours = _raw(GROUND_SYSTEM, GROUND_COMPONENT)
-        messages = [(_raw(system, component), time_ns, raw) for time_ns, system, component, _, _, raw in came]
-        messages += [(ours, time_ns, raw) for time_ns, raw in went]
+        ours = raw_channel(GROUND_SYSTEM, GROUND_COMPONENT)
+        messages = [Message(raw_channel(frame.system, frame.component), frame.time_ns, frame.raw) for frame in came]
+        messages += [Message(ours, time_ns, raw) for time_ns, raw in went]
         if self._decodes:
             read = chain(came, *(self._framer.frames(time_ns, raw) for time_ns, raw in went))
-            messages += [message for frame in read for message in _decoded(frame)]
+            messages += filter(None, map(decoded.message, read))
         return messages
 
     def _topics(self, tick: Tick, pose: Pose | None) -> Iterator[Message]:
         """What is said of a turn; /tick ends it."""
         time_ns = tick.time_ns
         for topic, message in self._own.of(tick, pose):
-            yield _json(topic, message.__class__), time_ns, orjson.dumps(message, option=OPTIONS)
+            yield Message(_json(topic, message.__class__), time_ns, orjson.dumps(message, option=OPTIONS))
         for topic, kind, data in self._viewers.of(tick):
-            yield _protobuf(topic, kind), time_ns, data  # type: ignore[arg-type]  # mypy has no class hashed
-        yield _json("/tick", topics.TickTopic), time_ns, orjson.dumps(tick_topic(tick), option=OPTIONS)
+            yield Message(_protobuf(topic, kind), time_ns, data)  # type: ignore[arg-type]  # mypy has no class hashed
+        yield Message(_json("/tick", topics.TickTopic), time_ns, orjson.dumps(tick_topic(tick), option=OPTIONS))
 
 
 class Tap:
@@ -193,23 +192,6 @@ class Tap:
     def rejected(self) -> int:
         """What the link refused."""
         return self._link.rejected
-
-
-@cache
-def _raw(system: int, component: int) -> Channel:
-    return Channel(f"/mavlink/{system}_{component}/raw", "mavlink")
-
-
-def _decoded(frame: Frame) -> Iterator[Message]:
-    read = decoded(frame)
-    if read is not None:
-        name, data = read
-        yield _message(frame.system, frame.component, name), frame.time_ns, data
-
-
-@cache
-def _message(system: int, component: int, name: str) -> Channel:
-    return Channel(decoded_topic(system, component, name), "json", f"{SCHEMA}{name}", "jsonschema", schema(name))
 
 
 @cache
