@@ -151,6 +151,7 @@ def _ways(told: Told, ground: Ground, room: Room, rows: Rows) -> list[str]:
         parts.append(ground.way(mean, "mean", told.mean))
         if np.isfinite(mean[-1]).all():
             x, y = ground.at(mean[-1])
+            room.take((x - 5.0, y - 5.0, x + 5.0, y + 5.0))
             end = [element("path", hover(told.mean), d=f"M{x:.1f},{y - 5:.1f}l5,5l-5,5l-5,-5Z", class_="end")]
     last = told.history.position[rows[-1], :, :2]
     seen = [row for row in order if np.isfinite(last[row]).all()]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import groupby, pairwise
+from itertools import pairwise
 
 import numpy as np
 
-from gcs.events import Rating
 from gcs.recording.history import Kind
 from gcs.report.distrust import Distrust, distrusts
+from gcs.report.rated import in_words
 from gcs.report.telling import FEW, Sentence, Strand, capital, counted, crowd, listed, some
 from gcs.report.told import Told
 from gcs.words import faults, robots
@@ -18,10 +18,10 @@ from gcs.words import faults, robots
 
 def meanwhile(told: Told) -> list[Strand]:
     """Before the mission too; of a flight that never began its mission, only who said what and who was silent."""
-    people = [*_operator(told), *_silences(told)]
+    people = [*_operator(told), *_hands(told), *_silences(told)]
     if not told.mission.size:
         return people
-    return [*_calls(told), *people, *_faults(told), *_distrust(told), *_left(told), *_ratings(told), *_legs(told)]
+    return [*_calls(told), *people, *_faults(told), *_distrust(told), *_left(told), *in_words(told), *_legs(told)]
 
 
 def when(told: Told, at_s: float) -> str:
@@ -55,6 +55,19 @@ def _operator(told: Told) -> Iterator[Strand]:
     words = [f"“{one.words.split(': ', 1)[-1]}”" for one in said]
     most = " and ".join(words) if len(words) < FEW else f"{', '.join(words[: FEW - 1])}, …, at last {words[-1]}"
     in_sum = f"{_from(told, times_s[0])} the operator spoke {len(said)} times: {most}."
+    yield Strand(tuple(sentences), Sentence(times_s[0], in_sum))
+
+
+def _hands(told: Told) -> Iterator[Strand]:
+    """Who was not ours any more, and who was again."""
+    changed = [one for one in told.history.happenings if one.kind is Kind.HANDS]
+    if not changed:
+        return
+    times_s = [float(told.since_s[one.tick]) for one in changed]
+    sentences = [Sentence(at_s, f"{when(told, at_s)} {one.words}.") for at_s, one in zip(times_s, changed, strict=True)]
+    whom = sorted({one.vehicle for one in changed if one.vehicle is not None})
+    often = f"{crowd(whom)} changed hands, {len(changed)} times in all"
+    in_sum = f"{_from(told, times_s[0])} {often}; at last {changed[-1].words}."
     yield Strand(tuple(sentences), Sentence(times_s[0], in_sum))
 
 
@@ -203,44 +216,3 @@ def _left(told: Told) -> Iterator[Strand]:
     if led:
         said = f"From {led[0].at_s:.1f} s on the lead changed {len(led)} times: at last {crowd(parts.leaders)} led."
         yield Strand(tuple(led), Sentence(led[0].at_s, said), spared=f"{counted(len(led), 'change')} of the lead")
-
-
-def _ratings(told: Told) -> Iterator[Strand]:
-    """Who said what, one by one if it is little."""
-    said = [(rating, rating.time_s) for rating in told.history.ratings if rating.time_s is not None]
-    if not said:
-        return
-    spared = counted(len(said), "rating")
-    if len(said) <= FEW:
-        by_rater = groupby(sorted(said, key=lambda one: one[0].rater), key=lambda one: one[0].rater)
-        given = [(rater, list(of_one)) for rater, of_one in by_rater]
-        sentences = (
-            Sentence(of_one[0][1], f"{rater} gave {listed([_given(*one) for one in of_one])}.")
-            for rater, of_one in given
-        )
-        yield Strand(tuple(sentences), spared=spared)
-        return
-    first_s, raters = min(at_s for _, at_s in said), sorted({rating.rater for rating, _ in said})
-    who = raters[0] if len(raters) == 1 else f"{len(raters)} people"
-    everything = f"From {first_s:.1f} s on {who} gave {len(said)} ratings{_worst([rating for rating, _ in said])}."
-    yield Strand.one(first_s, everything, spared=spared)
-
-
-def _given(rating: Rating, at_s: float) -> str:
-    whom = "the swarm" if rating.vehicle is None else f"robot {rating.vehicle}"
-    return f"{rating.rating} of 5 to {whom} at {at_s:.1f} s"
-
-
-def _worst(said: Sequence[Rating]) -> str:
-    """Of robots, who came off worst on average, or that all came off alike."""
-    means = {
-        system: float(np.mean([rating.rating for rating in said if rating.vehicle == system]))
-        for system in sorted({rating.vehicle for rating in said if rating.vehicle is not None})
-    }
-    if not means:
-        return ""
-    least = min(means.values())
-    worst = [system for system, mean in means.items() if mean < least + 1e-9]
-    if 1 < len(worst) == len(means):
-        return f"; {crowd(worst)} came off alike, {least:.1f} of 5 on average"
-    return f"; {crowd(worst)} came off worst, {least:.1f} of 5 on average"

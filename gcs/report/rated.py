@@ -1,14 +1,18 @@
-"""What people said, as marks on the chart of trust: 1 of 5 at 0, 5 of 5 at 1, round of a robot, square of all."""
+"""What people said: in a sentence or two, and as marks on the chart of trust, round of a robot, square of all."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from itertools import groupby
+
+import numpy as np
 
 from gcs.events import Rating
 from gcs.recording import sentences
 from gcs.report.axes import Frame
 from gcs.report.svg import TEXT, element, hover, words
+from gcs.report.telling import FEW, Sentence, Strand, counted, crowd, listed
 from gcs.report.told import Told
 
 MOST_FIGURES = 24
@@ -75,3 +79,44 @@ def _mark(told: Told, frame: Frame, rating: Rating, at_s: float, said: str, *, f
         mark = element("circle", cx=x, cy=y, r=size, class_=class_)
     value = words(x, y + 0.35 * TEXT, str(rating.rating), "value", anchor="middle") if figure else ""
     return element("g", hover(said) + mark + value)
+
+
+def in_words(told: Told) -> Iterator[Strand]:
+    """Who said what, one by one if it is little."""
+    said = _timed(told)
+    if not said:
+        return
+    spared = counted(len(said), "rating")
+    if len(said) <= FEW:
+        by_rater = groupby(sorted(said, key=lambda one: one[0].rater), key=lambda one: one[0].rater)
+        given = [(rater, list(of_one)) for rater, of_one in by_rater]
+        sentences = (
+            Sentence(of_one[0][1], f"{rater} gave {listed([_given(*one) for one in of_one])}.")
+            for rater, of_one in given
+        )
+        yield Strand(tuple(sentences), spared=spared)
+        return
+    first_s, raters = min(at_s for _, at_s in said), sorted({rating.rater for rating, _ in said})
+    who = raters[0] if len(raters) == 1 else f"{len(raters)} people"
+    everything = f"From {first_s:.1f} s on {who} gave {len(said)} ratings{_worst([rating for rating, _ in said])}."
+    yield Strand.one(first_s, everything, spared=spared)
+
+
+def _given(rating: Rating, at_s: float) -> str:
+    whom = "the swarm" if rating.vehicle is None else f"robot {rating.vehicle}"
+    return f"{rating.rating} of 5 to {whom} at {at_s:.1f} s"
+
+
+def _worst(said: Sequence[Rating]) -> str:
+    """Of robots, who came off worst on average, or that all came off alike."""
+    means = {
+        system: float(np.mean([rating.rating for rating in said if rating.vehicle == system]))
+        for system in sorted({rating.vehicle for rating in said if rating.vehicle is not None})
+    }
+    if not means:
+        return ""
+    least = min(means.values())
+    worst = [system for system, mean in means.items() if mean < least + 1e-9]
+    if 1 < len(worst) == len(means):
+        return f"; {crowd(worst)} came off alike, {least:.1f} of 5 on average"
+    return f"; {crowd(worst)} came off worst, {least:.1f} of 5 on average"

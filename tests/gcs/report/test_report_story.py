@@ -135,8 +135,16 @@ def test_who_fell_silent_for_good_is_said_to_be_where_it_was_heard_last():
     assert "robots 1, 2, 4, 5, 6 still in the air" in said
 
 
-def word(history, row, words):
-    return Happening(int(history.time_ns[row]), row, float(history.mission_s[row]), Kind.WORD, None, words)
+def word(history, row, words, kind=Kind.WORD, vehicle=None):
+    return Happening(int(history.time_ns[row]), row, float(history.mission_s[row]), kind, vehicle, words)
+
+
+def test_who_was_taken_over_is_told_and_is_not_called_silent():
+    history = dragged(2, 3)
+    words = "vehicle 3 is not ours any more: nothing is sent to it"
+    said = told(replace(history, happenings=(word(history, 40, words, Kind.HANDS, 3),)))
+    assert f"At 4.0 s {words}." in said
+    assert "silent" not in said
 
 
 def test_what_the_operator_said_before_the_mission_is_told_and_why_there_is_no_score():
