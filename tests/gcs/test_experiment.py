@@ -49,7 +49,10 @@ title = "Short"
 seeds = 2
 reference = "truth"
 scenarios = ["transit"]
-set = ["mission.leg.0.length_m=3", "mission.leg.1.length_m=4.5", "mission.run_up_s=1", "swarm.altitude_m=4", "time.physics_hz=100"]
+set = [
+    "mission.leg.0.length_m=3", "mission.leg.1.length_m=4.5", "mission.run_up_s=1", "swarm.altitude_m=4",
+    "time.physics_hz=100",
+]
 
 [[suite]]
 name = "base"
