@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from gcs.recording.channels import Channels, Message
+from gcs.recording.channels import Channel, Channels
 from gcs.recording.files import DROPPED, METADATA, PART, SCENARIO, RecordingError, part
 from gcs.recording.mcap_file import McapFile
 from gcs.recording.seal import sealed
@@ -71,8 +71,8 @@ class Rotation:
         on = f"; it goes on in {part(self._path, self._number).name}" if self._number > 1 else ""
         return f"{self._path}: the recording stopped: {self._why}; {missing(self.dropped, 'message')}{on}"
 
-    def add(self, messages: Iterable[Message]) -> None:
-        """In their order; lost, and counted, while the disk takes nothing."""
+    def add(self, messages: Iterable[tuple[Channel, int, bytes]]) -> None:
+        """In their order, each with its time, ns since 1970; lost, and counted, while the disk takes nothing."""
         file = self._file
         if file is None:
             self.dropped += sum(1 for _ in messages)
