@@ -18,7 +18,7 @@ from gcs.links import FLIES, LISTENS, opened, understood
 from gcs.listen import before_arming, listen
 from gcs.loop import Clock, Link
 from gcs.operator import Operator
-from gcs.output import PICTURE, make_room, output_folder, room
+from gcs.output import PICTURE, claimed, make_room, output_folder, room
 from gcs.progress import Display
 from gcs.rates import positions_per_tick
 from gcs.recording import files
@@ -129,9 +129,10 @@ def flight(
     with ExitStack() as stack:
         live_ratings = request.supervision.live(stack, scenario, console.say)
         folder = output_folder(request.out, request.name, needs=room(scenario))
+        stack.enter_context(claimed(folder))
         earlier = make_room(folder)
         if earlier is not None:
-            console.say(f"an earlier recording is kept as {earlier}")
+            console.say(f"what an earlier run left is kept as {earlier}")
         journal = None
         if way.listens is not None:
             journal = stack.enter_context(Journal(files.journal(folder / RECORDING), console.say))

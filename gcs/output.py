@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import datetime as dt
+import fcntl
+import os
+import re
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from itertools import count as counted
 from pathlib import Path
 
-from gcs.recording import files
 from gcs.recording.files import RecordingError
 from gcs.recording.reader import RECORDING
 from scenarios import Scenario
 
-PICTURE = "trajectory.png"
+SUMMARY, PICTURE = "summary.json", "trajectory.png"
 
 
 class Unwritable(OSError):
@@ -64,25 +66,74 @@ A_VEHICLE_MINUTE, A_PAIR_MINUTE = 2_000_000, 20_000
 """Bytes of a recording and its journal, at most: frames of each vehicle, and what each thinks of each."""
 
 
+STEM = Path(RECORDING).stem
+WRITTEN = re.compile(rf"{STEM}(\.part\d+)?\.mcap|{STEM}\.tlog|{re.escape(SUMMARY)}|{re.escape(PICTURE)}")
+"""What a run writes."""
+MADE_OF_IT = re.compile(
+    rf"{STEM}(\.part\d+)?(-recovered|-decoded|-frames)*(\.mcap|\.tlog|-csv|-parquet)|report\.html|(video|blind)\.mp4"
+)
+"""What recover, export, import, report and video make of it, where nobody names another place."""
+
+
+@contextmanager
+def claimed(folder: Path) -> Iterator[None]:
+    """A folder for one flight at a time, whichever process flies it. Raises RecordingError."""
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        raise RecordingError(f"--out {folder}: cannot be read: {error.strerror or error}") from None
+    try:
+        if not _locked(handle):
+            raise RecordingError(f"--out {folder}: another flight is being recorded there: name another folder")
+        yield
+    finally:
+        os.close(handle)
+
+
+def _locked(handle: int) -> bool:
+    """False where another process has it. Where there are no locks, its files still take nobody's place."""
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        return not isinstance(error, BlockingIOError)
+    return True
+
+
 def make_room(folder: Path) -> Path | None:
-    """Take what an earlier run left out of the way: its recording, further parts of it and its journal are kept
-    under the time they were closed at.
+    """Take what an earlier run left, and what was made of it, out of the way: it is kept under the time it ended at.
+
+    Returns the first of it, the recording if there is one. Raises RecordingError.
     """
-    for name in ("summary.json", PICTURE):
-        (folder / name).unlink(missing_ok=True)
-    recording = folder / RECORDING
-    earlier = [path for path in (recording, files.journal(recording), *files.further_parts(recording)) if _holds(path)]
-    if not earlier:
-        return None
-    closed = max(path.stat().st_mtime for path in earlier)
-    stem = f"{recording.stem}-{dt.datetime.fromtimestamp(closed, dt.UTC):%Y%m%dT%H%M%S}"
-    kept = next(path for path in _namesakes(folder, stem, recording.suffix) if not any(folder.glob(f"{path.stem}.*")))
-    first, *_ = [path.rename(folder / f"{kept.stem}{path.name.removeprefix(recording.stem)}") for path in earlier]
-    return first
+    try:
+        left = sorted(filter(_holds, folder.iterdir()), key=lambda path: (path.name != RECORDING, path.name))
+        if not any(WRITTEN.fullmatch(path.name) for path in left):
+            return None
+        ended = max(path.stat().st_mtime for path in left if WRITTEN.fullmatch(path.name))
+        stem = f"{STEM}-{dt.datetime.fromtimestamp(ended, dt.UTC):%Y%m%dT%H%M%S}"
+        kept = next(path.name for path in _namesakes(folder, stem) if not any(folder.glob(f"{path.name}[.-]*")))
+        first, *_ = [path.rename(folder / f"{kept}{_behind_stem(path.name)}") for path in left]
+        return first
+    except OSError as error:
+        if isinstance(error, RecordingError):
+            raise
+        why = error.strerror or error
+        raise RecordingError(f"--out {folder}: what an earlier run left there cannot be moved: {why}") from None
 
 
 def _holds(path: Path) -> bool:
-    return path.is_file() and path.stat().st_size > 0
+    """Whether an earlier run left it, and something in it. Raises RecordingError of what would only be in the way."""
+    if not WRITTEN.fullmatch(path.name):
+        return MADE_OF_IT.fullmatch(path.name) is not None and path.exists()
+    if not path.is_file():
+        raise RecordingError(f"--out {path}: is no file, and in the way: name another folder")
+    if path.stat().st_size == 0:
+        path.unlink()
+        return False
+    return True
+
+
+def _behind_stem(name: str) -> str:
+    return name.removeprefix(STEM) if name.startswith(STEM) else f"-{name}"
 
 
 def room(scenario: Scenario) -> int:
@@ -124,8 +175,8 @@ def _new(folder: Path) -> Path:
     raise AssertionError("names never end")
 
 
-def _namesakes(folder: Path, stem: str, suffix: str = "") -> Iterator[Path]:
+def _namesakes(folder: Path, name: str) -> Iterator[Path]:
     """This name in the folder, then the same numbered from 2, without end."""
-    yield folder / f"{stem}{suffix}"
+    yield folder / name
     for number in counted(2):
-        yield folder / f"{stem}-{number}{suffix}"
+        yield folder / f"{name}-{number}"

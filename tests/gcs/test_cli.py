@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections import Counter
 from contextlib import closing
+from pathlib import Path
 
 import orjson
 import pytest
@@ -17,8 +18,11 @@ from disks import Limited
 from flights import GCS, SHORT, messages, recorded, start
 
 from gcs import flying
-from gcs.output import make_room, output_folder, room
+from gcs.output import PICTURE, claimed, make_room, output_folder, room
+from gcs.recording.export import NAMES
+from gcs.recording.files import RecordingError
 from gcs.replay.verify import decide_again
+from gcs.report.command import PAGE
 
 CONTRACT = {
     "scenario", "controller", "trust", "severity", "seed", "heading_error_deg", "distance_to_target_m",
@@ -379,10 +383,11 @@ def test_a_polite_kill_lands_the_swarm_too(tmp_path):
 
 
 def test_a_disk_that_is_full_before_take_off_is_refused(gcs, tmp_path):
-    (tmp_path / "run.mcap").symlink_to("/dev/full")
-    code, out, err = gcs("run", "demo", *BRIEFLY, "--out", tmp_path, "--json")
+    with Limited(600):
+        code, out, err = gcs("run", "demo", *BRIEFLY, "--out", tmp_path, "--json")
     assert (code, out) == (2, "")
-    assert err == f"gcs: {tmp_path}/run.mcap: the recording cannot be written: No space left on device\n"
+    assert err == f"gcs: {tmp_path}/run.mcap: the recording cannot be written: File too large\n"
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_disk_that_fills_up_in_flight_is_told_and_counts_as_a_problem_of_the_flight(gcs, tmp_path):
@@ -447,6 +452,45 @@ def test_its_journal_and_its_further_parts_are_kept_with_it(tmp_path):
         assert not [name for name in left if (tmp_path / name).exists()]
         for name, data in left.items():
             (tmp_path / name).write_bytes(data)
+
+
+def test_all_that_was_made_of_it_is_kept_with_it(tmp_path):
+    """What somebody else put there, and what is kept already, stays where it is."""
+    made = [f"run{behind}" for behind in (*NAMES.values(), "-recovered.mcap", "-recovered-csv", ".part2-frames.tlog")]
+    beside = [PICTURE, PAGE, "summary.json", "video.mp4", "blind.mp4"]
+    others = ["run.toml", "run-20260101T000000.mcap", "comparison.png", "run-of-mine.mcap"]
+    for name in ("run.mcap", *made, *beside, *others):
+        (tmp_path / name).write_bytes(name.encode())
+    (tmp_path / "run-csv").unlink()
+    (tmp_path / "run-csv").mkdir()
+    stem = make_room(tmp_path).stem
+    kept = {name: f"{stem}{name.removeprefix('run')}" for name in ("run.mcap", *made)}
+    kept |= {name: f"{stem}-{name}" for name in beside} | {name: name for name in others}
+    assert {path.name for path in tmp_path.iterdir()} == set(kept.values())
+    assert (tmp_path / f"{stem}-csv").is_dir()
+    assert all((tmp_path / now).read_bytes() == was.encode() for was, now in kept.items() if was != "run-csv")
+
+
+@pytest.mark.parametrize("name", ["run.mcap", "run.part2.mcap", "run.tlog", "summary.json", "trajectory.png"])
+@pytest.mark.parametrize("make", [Path.mkdir, os.mkfifo, lambda path: path.symlink_to("nowhere")], ids="dpl")
+def test_what_would_be_in_the_way_is_refused_in_a_sentence_and_nothing_is_moved(tmp_path, name, make):
+    (tmp_path / "run-csv").mkdir()
+    make(tmp_path / name)
+    with pytest.raises(RecordingError, match=rf"{name}: is no file, and in the way: name another folder$"):
+        make_room(tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {"run-csv", name}
+
+
+def test_a_folder_in_which_another_flight_is_being_recorded_is_refused(gcs, tmp_path):
+    """And left as it is: what it holds is that flight's."""
+    (tmp_path / "run.mcap").write_bytes(b"being written")
+    with claimed(tmp_path):
+        code, out, err = gcs("run", "demo", *BRIEFLY, "--out", tmp_path)
+    assert (code, out) == (2, "")
+    assert err == f"gcs: --out {tmp_path}: another flight is being recorded there: name another folder\n"
+    assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"being written"]
+    with claimed(tmp_path):
+        pass
 
 
 def test_a_journal_whose_recording_is_gone_is_kept_too(tmp_path):
