@@ -9,7 +9,7 @@ from pathlib import Path
 
 from gcs.choices import Choices
 from gcs.events import Event, Rating
-from gcs.recording.files import METADATA, further_parts
+from gcs.recording.files import METADATA, further_parts, recovering
 from gcs.recording.reader import CUT_SHORT, UnreadableRecording, instead_of_scenario, opened, ticks
 from gcs.supervision import Supervision, takes_ratings
 from gcs.versions import others
@@ -52,8 +52,8 @@ def _once_more(
 ) -> ToFly:
     """Ratings that counted in the mission do so at the same time of the mission; all else comes at its tick."""
     with opened(path) as recording:
-        told, problem = recording.metadata[METADATA], recording.problem
-        scenario = choices.revised(recording.scenario, source=str(path))
+        told, problem, flown = recording.metadata[METADATA], recording.problem, recording.scenario
+    scenario = choices.revised(flown, source=str(path))
     said = [(page.number, page.events) for page in ticks(path)]
     seed = _seed(told, path, say) if seed is None else seed
     for remark in _remarks(told, [number for number, _ in said], path, problem):
@@ -89,7 +89,7 @@ def _remarks(told: Mapping[str, str], numbers: Sequence[int], path: Path, proble
     if lost:
         yield f"lacks {lost} of its ticks; what was said in them is not said again"
     if parts := ", ".join(part.name for part in further_parts(path)):
-        yield f"goes on in {parts}, of which nothing is said again; gcs log recover {path} puts it together"
+        yield f"goes on in {parts}, of which nothing is said again; {recovering(path)} joins all"
     elif problem == CUT_SHORT:
         yield "ends before the flight did; what was said after that is not said again"
 

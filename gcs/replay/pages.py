@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import orjson
 
-from gcs.recording.files import further_parts
+from gcs.recording.files import further_parts, recovering
 from gcs.recording.reader import (
     CUT_SHORT,
     SENT,
@@ -79,7 +79,7 @@ class Pages:
         """What is not in this file, in words; None where nothing is known to be missing behind its end."""
         if self.parts:
             where = ", ".join(part.name for part in self.parts)
-            return f"the recording goes on in {where}; gcs log recover {self.told.path} puts it together"
+            return f"the recording goes on in {where}; {recovering(self.told.path)} joins all"
         return f"{CUT_SHORT}: what was sent then is not in it" if self.cut_short else None
 
     def mission_s(self, time_ns: int) -> float | None:

@@ -173,7 +173,7 @@ def test_what_a_recording_does_not_hold_of_its_flight_is_said_not_to_be_said_aga
         shutil.copy(recorded(*BRIEF).path, tmp_path / name)
     path = tmp_path / "run.mcap"
     assert prepared(tmp_path)[1] == [
-        f"{path}: goes on in run.part2.mcap, of which nothing is said again; gcs log recover {path} puts it together"
+        f"{path}: goes on in run.part2.mcap, of which nothing is said again; gcs log recover {path} joins all"
     ]
     path = unended(recorded(*BRIEF).path)
     assert prepared(path)[1] == [f"{path}: ends before the flight did; what was said after that is not said again"]
@@ -197,7 +197,9 @@ def test_what_is_no_recording_is_refused_in_a_sentence(gcs, tmp_path):
     refused(gcs("run", tmp_path / "none.mcap"), "none.mcap: cannot be read")
     refused(gcs("run", tmp_path / "folder"), "run.mcap: cannot be read")
     refused(gcs("run", tmp_path / "torn.mcap"), "torn.mcap: torn", "gcs log recover")
-    refused(gcs("run", recorded(*BRIEF).path, "--set", "control.c9=1"), "control.c9 = 1: there is no such key")
+    refused(
+        gcs("run", recorded(*BRIEF).path, "--set", "control.c9=1"), "run.mcap: control.c9 = 1: there is no such key"
+    )
     refused(gcs("run", recorded(*BRIEF).path, "--seed", "-1"), "--seed -1")
 
 

@@ -157,7 +157,7 @@ def test_that_the_recording_is_not_all_of_the_flight_is_said(gcs, tmp_path):
     for name in ("run.mcap", "run.part2.mcap"):
         shutil.copy(recorded(*BRIEF).path, tmp_path / name)
     _, out, err = gcs("replay", tmp_path, "--controller", "average", "--json")
-    assert err.startswith(f"the recording goes on in run.part2.mcap; gcs log recover {tmp_path / 'run.mcap'} puts it")
+    assert err.startswith(f"the recording goes on in run.part2.mcap; gcs log recover {tmp_path / 'run.mcap'} joins all")
     assert orjson.loads(out)["further_parts"] == ["run.part2.mcap"]
     _, out, err = gcs("replay", unended(recorded(*BRIEF).path), "--controller", "average", "--json")
     assert err.startswith("the recording ends before the flight did")

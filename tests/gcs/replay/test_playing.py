@@ -20,7 +20,7 @@ import pytest
 from flights import GCS, SHORT, messages, recorded, scratch, start
 from pymavlink import mavutil
 
-from gcs.replay import timeline
+from gcs.replay import command, timeline
 from gcs.replay.command import IDLE_NS, LONGEST_TURN_NS, Playback, Words
 from gcs.replay.player import Player
 from gcs.replay.reel import Reel
@@ -161,6 +161,14 @@ def test_what_was_played_is_one_line_or_one_object(gcs, flight):
     assert told["to_s"] == pytest.approx(last, abs=1e-3)
     assert told["messages"] > told["frames_sent"] > 0
     assert told["frames_held_back"] == {}
+
+
+def test_that_a_large_recording_is_being_read_is_said_at_once(gcs, monkeypatch):
+    path = recorded("demo", *SHORT).path
+    assert "reading" not in gcs("replay", path, "--from", "done", "--speed", "10")[2]
+    monkeypatch.setattr(command, "LARGE", path.stat().st_size)
+    told = gcs("replay", recorded("demo", *SHORT).folder, "--from", "done", "--speed", "10")[2].splitlines()
+    assert told[0] == f"reading {path}, {path.stat().st_size / 1e6:.0f} MB"
 
 
 @pytest.mark.parametrize(
@@ -329,6 +337,18 @@ def test_with_keys_on_a_terminal_which_is_stopped_and_left_as_it_was():
 
 
 @pytest.mark.wall_clock
+def test_with_its_result_redirected_it_takes_keys_all_the_same_and_on_a_dumb_terminal_none():
+    with Attended(
+        f"{replay()} --json > /dev/null; echo code $?; TERM=dumb {replay()} --speed 10; echo code $?"
+    ) as seen:
+        seen.see(rb"since mission start")
+        seen.type(b"q")
+        seen.see(rb"code 0")
+        seen.see(rb"run\.mcap from 2\.0 s to \d+\.\d s: \d+ messages")
+        seen.see(rb"code 0")
+
+
+@pytest.mark.wall_clock
 @pytest.mark.parametrize("how", ["ctrl-c", "term"])
 def test_ctrl_c_and_a_polite_kill_leave_a_sane_terminal(how):
     with Attended(f"{replay()} & echo pid $!; fg; echo code $?; {MODES}") as seen:
@@ -338,6 +358,7 @@ def test_ctrl_c_and_a_polite_kill_leave_a_sane_terminal(how):
         else:
             os.kill(seen.foreground, signal.SIGTERM)
         seen.see(rb"\x1b\[\?25h\x1b\[\?1049l")
+        seen.see(rb"run\.mcap from 2\.0 s to \d+\.\d s: \d+ messages")
         seen.see(rb"code 130")
         seen.see(SANE)
 
