@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,9 +17,8 @@ from gcs.recording import decoded, tables
 from gcs.recording.channels import RAW, Channels
 from gcs.recording.contents import frame_of, frames, records
 from gcs.recording.copied import Copy
-from gcs.recording.files import importing
 from gcs.recording.mcap_file import McapFile
-from gcs.recording.reader import UnreadableRecording, located, readable
+from gcs.recording.reader import UnreadableRecording, located
 from gcs.recording.table_files import MEANINGS, CsvFile, TableFile, TableFolder, parquet_file
 from gcs.recording.tidy import Row, Tidy, of_frame
 from gcs.recording.tlog import packed
@@ -35,8 +35,6 @@ def export(path: Path, *, to: Form, out: Path | None, console: Any) -> int:
     Raises UnreadableRecording, Unwritable where something is there already, BadUsageError where an extra is missing.
     """
     path = located(path)
-    if path.suffix == ".tlog":
-        raise UnreadableRecording(f"{path}: no recording: {importing(path)} makes one of it")
     if out is None:
         out = path.with_name(f"{path.stem}{NAMES[to]}")
     check_free(out)
@@ -97,21 +95,31 @@ def _to_tables(path: Path, out: Path, console: Any, *, kind: Callable[[Path, tab
 def _rows(path: Path) -> Iterator[tuple[tables.Table, Row]]:
     """Every row that a recording makes, with its table."""
     tidy, channels, ours = Tidy(), dict[int, Channel](), set[int]()
-    with readable(path):
-        for record in records(path):
-            if isinstance(record, Schema) and record.name.startswith(SCHEMA):
-                ours.add(record.id)
-            elif isinstance(record, Channel):
-                channels[record.id] = record
-            elif isinstance(record, Message):
-                channel = channels[record.channel_id]
-                if channel.message_encoding == RAW:
-                    frame = frame_of(record.log_time, record.data)
-                    row = None if frame is None else of_frame(frame)
-                    if row is not None:
-                        yield row
-                elif channel.schema_id in ours:
-                    yield from tidy.rows(channel.topic, record.log_time, record.data)
+    for record in records(path):
+        if isinstance(record, Schema) and record.name.startswith(SCHEMA):
+            ours.add(record.id)
+        elif isinstance(record, Channel):
+            channels[record.id] = record
+        elif isinstance(record, Message):
+            channel = channels[record.channel_id]
+            if channel.message_encoding == RAW:
+                frame = frame_of(record.log_time, record.data)
+                row = None if frame is None else of_frame(frame)
+                if row is not None:
+                    yield row
+            elif channel.schema_id in ours:
+                with _of_this_version(path, channel.topic):
+                    rows = list(tidy.rows(channel.topic, record.log_time, record.data))
+                yield from rows
+
+
+@contextmanager
+def _of_this_version(path: Path, topic: str) -> Iterator[None]:
+    """What a topic of this name does not tell, or tells otherwise, becomes one sentence."""
+    try:
+        yield
+    except (LookupError, TypeError, ValueError):
+        raise UnreadableRecording(f"{path}: {topic} is not as this version writes it") from None
 
 
 def _to_csv(path: Path, out: Path, console: Any) -> None:

@@ -102,7 +102,7 @@ class TableFolder:
 
 
 class CsvFile:
-    """As RFC 4180 has it, with a line of names; text is in quotes, a bool is true or false."""
+    """Fields as in RFC 4180, lines that end in LF, the first of names; text is in quotes, a bool true or false."""
 
     def __init__(self, stem: Path, table: Table) -> None:
         self._file: TextIO = stem.with_name(f"{stem.name}.csv").open("w", encoding="utf-8", newline="")

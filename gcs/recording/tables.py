@@ -1,6 +1,6 @@
 """Tidy tables of a flight: which there are, and what their columns mean.
 
-What a column means is said once: by the topic it comes from, or by the MAVLink dialect.
+What a column means is said once: by the topic it comes from, by `column_words`, or by the MAVLink dialect.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
+from gcs.recording.column_words import WORDS
 from gcs.recording.layouts import Field, layout
 from gcs.recording.topics import (
     EvidenceTopic,
@@ -78,10 +79,11 @@ def _sentence(topic: type) -> str:
 
 
 def _column(topic: type, key: str, name: str | None = None, type_: str = "float64") -> Column:
-    """What a topic tells under a key, in the topic's own words."""
+    """What a topic tells under a key; in the topic's own words, unless they are about more than this column."""
     name = key if name is None else name
     unit = next((unit for end, unit in UNITS.items() if name.endswith(end)), "")
-    return Column(name, type_, unit, schema(topic)["properties"][key].get("description") or _sentence(topic))
+    said = WORDS.get((topic, name)) or schema(topic)["properties"][key]["description"]
+    return Column(name, type_, unit, said)
 
 
 def _numbers(topic: type, *keys: str) -> tuple[OfVehicle, ...]:
@@ -139,7 +141,7 @@ WEIGHTS = Table(
         MISSION_S,
         Column("robot", "int64", "", "System id of i."),
         Column("heeds", "int64", "", "System id of whom it heeds."),
-        Column("weight", "float64", "", _sentence(WeightsTopic)),
+        Column("weight", "float64", "", WORDS[WeightsTopic, "weight"]),
     ),
 )
 MISSION = Table(
