@@ -14,12 +14,15 @@ from rich.table import Table
 from rich.text import Text
 
 from gcs.console import write
-from gcs.recording.files import METADATA
+from gcs.recording.files import METADATA, recovering
 from gcs.recording.inventory import Inventory, Listed, inventory
 from gcs.recording.reader import CUT_SHORT, located
 from gcs.recording.recovery import RECOVERED
 from gcs.summary import trust_of
 from gcs.words import controller_name, ending, faults
+
+WIDEST = 500
+"""Columns of a terminal, at most: to see what a table would like."""
 
 
 def show(path: Path, *, as_json: bool, console: Any) -> int:
@@ -36,7 +39,7 @@ def show(path: Path, *, as_json: bool, console: Any) -> int:
     for name, words in _lines(found):
         head.add_row(name, Text(words))
     console.print(head)
-    console.print(_topics(found))
+    console.print(_fitting(found, console))
     return 0
 
 
@@ -58,22 +61,23 @@ def _lines(found: Inventory) -> Iterator[tuple[str, str]]:
     if found.versions:
         yield "versions", ", ".join(f"{name} {number}" for name, number in found.versions.items())
     if RECOVERED in found.metadata:
-        yield "recovered", found.metadata[RECOVERED]["words"]
+        yield "recovered", found.metadata[RECOVERED].get("words", "")
     for part in found.parts:
         yield "goes on in", f"{part.name}, {_size(part.stat().st_size)}"
     if found.journal is not None:
         yield "journal", f"{found.journal.name}, {_size(found.journal.stat().st_size)}"
     if found.bytes_per_vehicle_minute is not None:
-        yield "costs", f"{_size(found.bytes_per_vehicle_minute)} for a vehicle's minute"
+        beside = "" if found.journal is None and not found.parts else ", what lies beside this file not counted"
+        yield "costs", f"{_size(found.bytes_per_vehicle_minute)} for a vehicle's minute{beside}"
 
 
 def _state(found: Inventory) -> str:
     if found.whole:
-        return "whole, as far as this file goes: gcs log recover FILE joins all" if found.parts else "whole"
+        return f"whole, as far as this file goes: {recovering(found.path)} joins all" if found.parts else "whole"
     lost = sum(damage.length for damage in found.damage)
     what = "damaged" if found.ended else "torn: it ends without its summary"
     unreadable = f", {lost} bytes cannot be read" if lost else ""
-    return f"{what}{unreadable}: gcs log recover FILE rebuilds it"
+    return f"{what}{unreadable}: {recovering(found.path)} rebuilds it"
 
 
 def _outcome(found: Inventory) -> str:
@@ -86,17 +90,27 @@ def _size(size: float) -> str:
     return f"{size / 1e6:.2f} MB" if size >= 1e6 else f"{size / 1e3:.1f} kB"
 
 
-def _topics(found: Inventory) -> Table:
-    """A row for each topic; those that differ only in the vehicle share one."""
+def _fitting(found: Inventory, console: Any) -> Table:
+    """The topics; without what their messages are, if there is no room for it and topics tell rows apart."""
+    topics = _topics(found)
+    wide = console.measure(topics, options=console.options.update(width=WIDEST)).maximum > console.width
+    names = [name for name, _of, _group in _grouped(found.listed)]
+    return _topics(found, kinds=False) if wide and len(set(names)) == len(names) else topics
+
+
+def _topics(found: Inventory, *, kinds: bool = True) -> Table:
+    """A row for each topic; those that differ only in the vehicle share one. kinds: with what its messages are."""
     table = Table(box=box.SIMPLE_HEAD)
     table.add_column("topic", overflow="fold")
-    table.add_column("what", overflow="fold")
+    if kinds:
+        table.add_column("what", overflow="fold")
     for heading in ("messages", "Hz", "kB"):
         table.add_column(heading, justify="right", no_wrap=True)
     for name, of, group in _grouped(found.listed):
         messages, size = sum(one.messages for one in group), sum(one.bytes for one in group)
         rate = f"{messages / len(group) / found.duration_s:.1f}" if found.duration_s else "–"
-        table.add_row(Text(name), Text(of), str(messages), rate, f"{size / 1e3:.1f}")
+        what = [Text(of)] if kinds else []
+        table.add_row(Text(name), *what, str(messages), rate, f"{size / 1e3:.1f}")
     return table
 
 
@@ -136,7 +150,7 @@ def _json(found: Inventory) -> dict[str, Any]:
         "vehicles": found.vehicles,
         "controller": None if scenario is None else scenario.control.rule,
         "trust": None if scenario is None else trust_of(scenario),
-        "seed": int(about["seed"]) if about.get("seed") else None,
+        "seed": int(about["seed"]) if about.get("seed", "").isdecimal() else None,
         "versions": found.versions,
         "passed": found.summary.get("passed"),
         "problem": found.summary.get("problem", None if scenario is None else CUT_SHORT),

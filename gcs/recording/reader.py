@@ -21,7 +21,7 @@ from gcs.gate import LOST_NS
 from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
 from gcs.mission import plan
 from gcs.recording.channels import RAW, raw_topic
-from gcs.recording.files import FAULTS, MADE, METADATA, SCENARIO, SUMMARY
+from gcs.recording.files import FAULTS, MADE, METADATA, SCENARIO, SUMMARY, recovering
 from gcs.recording.mcap_file import MAGIC
 from gcs.track import Parts, Point, Track
 from scenarios import Scenario, names
@@ -149,11 +149,10 @@ def readable(path: Path) -> Iterator[None]:
         raise UnreadableRecording(f"{path}: cannot be read: {error.strerror or error}") from None
     except ValidationError:
         raise UnreadableRecording(f"{path}: its {SCENARIO} is no scenario of this version") from None
-    except DAMAGE as error:
+    except DAMAGE:
         if not _begins_as_mcap(path):
             raise UnreadableRecording(f"{path}: not an MCAP file, or its beginning is lost") from None
-        said = " ".join(str(error).split()) or type(error).__name__
-        raise UnreadableRecording(f"{path}: torn or damaged: {said}; gcs log recover FILE rebuilds it") from None
+        raise UnreadableRecording(f"{path}: torn or damaged; {recovering(path)} rebuilds it") from None
 
 
 def _begins_as_mcap(path: Path) -> bool:

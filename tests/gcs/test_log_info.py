@@ -91,7 +91,7 @@ def test_of_a_torn_recording_is_told_what_is_left_and_what_to_do(gcs, flight, tm
     assert found["journal"] == str(tmp_path / "run.tlog")
     _, out, _ = gcs("log", "info", tmp_path)
     assert "torn: it ends without its summary" in out
-    assert "gcs log recover FILE rebuilds it" in out
+    assert f"gcs log recover {tmp_path / 'run.mcap'} rebuilds it" in " ".join(out.split())
 
 
 def test_further_parts_are_named(gcs, flight, tmp_path):
