@@ -81,7 +81,8 @@ def _strays(before: int, time_us: int, behind: Iterable[Timed], habits: Habits) 
         if _follows(before, other, habits) and apart > habits.back_us and abs(other - before) < apart:
             return True  # what comes behind it goes on from before it
         times.append(other)
-    return not (_goes_on(time_us, times[1:], habits) or (len(times) == 1 and _follows(before, time_us, habits)))
+    alone = all(other >= time_us for other in times[1:])  # between two silences, or at the end
+    return not (_goes_on(time_us, times[1:], habits) or (alone and _follows(before, time_us, habits)))
 
 
 def _goes_on(time_us: int, behind: Iterable[int], habits: Habits) -> bool:

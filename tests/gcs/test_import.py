@@ -135,7 +135,7 @@ def test_what_is_strange_about_a_clock_is_said(times_us, problems):
 
 
 def test_a_strange_clock_is_no_reason_to_refuse_a_log(gcs, tmp_path):
-    (tmp_path / "mav.tlog").write_bytes(log_of(7, 8, START_US))
+    (tmp_path / "mav.tlog").write_bytes(log_of(7, 8, START_US, START_US + 1))
     code, _, said = gcs("log", "import", tmp_path / "mav.tlog")
     assert code == 0
     assert said.splitlines() == [
