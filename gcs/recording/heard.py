@@ -16,6 +16,7 @@ import orjson
 
 from gcs.messages import HEARTBEAT, STATUSTEXT
 from gcs.recording import said
+from gcs.recording.channels import RAW
 from gcs.recording.happenings import Kind
 from gcs.recording.reader import Message
 from gcs.telemetry import Swarm, observe
@@ -87,7 +88,7 @@ class Heard:
         log = list[tuple[int, Kind, int | None, str]]()
         framer, swarm = Framer(), Swarm.of(range(1, vehicles + 1))
         for topic, encoding, time_ns, data in messages:
-            if encoding == "mavlink":
+            if encoding == RAW:
                 if data[7:10] in TELLING or data[0] == MAGIC_1:
                     swarm = observe(swarm, framer.frames(time_ns, data))
                     words += ((system, text) for system, _severity, text in swarm.words)
