@@ -27,7 +27,7 @@ class LastResort:
     """
 
     def __init__(self, link: Link, clock: Clock, ids: Iterable[int], say: Callable[[str], None]) -> None:
-        """link, clock: without recorder or display in between; a journal may be, which keeps no frame from leaving."""
+        """link: what notes its frames may be in between, which keeps none from leaving."""
         self._link = link
         self._clock = clock
         self._say = say
@@ -53,7 +53,7 @@ class LastResort:
         self._released = frozenset(system for system, gone in released if gone)
 
     def land(self) -> None:
-        """Tell everybody who is ours, again and again: nobody listens for an answer."""
+        """Tell everybody who is ours, again and again: what they answer is taken for the record alone."""
         start_ns = self._now()
         for turn in range(ROUNDS):
             for system, frames in self._frames.items():
@@ -65,6 +65,8 @@ class LastResort:
                             self._link.send(system, frame)
             with suppress(Exception):
                 self._clock.sleep_until(start_ns + round((turn + 1) * PAUSE_S * 1e9))
+            with suppress(Exception):
+                self._link.receive()
 
     def _now(self) -> int:
         with suppress(Exception):

@@ -14,7 +14,7 @@ from gcs.emergency import LastResort
 from gcs.events import Rating
 from gcs.flight import Flight
 from gcs.flight_state import FlightState, left_behind
-from gcs.loop import Clock, Link, Record, fly
+from gcs.loop import Clock, Link, Record, Tick, fly
 from gcs.operator import Operator
 from gcs.output import PICTURE
 from gcs.recording.files import FAULTS, MADE, PLANNED, SUMMARY
@@ -71,7 +71,8 @@ def flown(
     reception: tells how the vehicles were heard, where the link knows;  faults_made: whether the link makes the
     scenario's faults, and they are not left to vehicles behind it.
     A recording or a display that fails is said at once and in the summary; the flight goes on. Any other error of the
-    loop lands the fleet before it is raised. Raises RecordingError before take-off where `out` cannot be written.
+    loop lands the fleet before it is raised, and is the problem that recording and summary.json tell. Raises
+    RecordingError before take-off where `out` cannot be written.
     """
     flight = Flight(scenario, ratings=ratings)
     truth = Truth(flight.ids)
@@ -91,33 +92,56 @@ def flown(
         faults_made=faults_made,
         say=say,
     )
+    noted = Tap(link, clock, recorder)
+    last_resort, reached = LastResort(noted, clock, flight.ids, say), _Reached(flight.start())
+
+    def told(failure: str | None = None) -> Summary:
+        """What came of it, in the recording too."""
+        took_s, path = time.perf_counter() - began, (out / RECORDING).resolve()
+        summary = _summary(
+            name, scenario, reached.state, failure, tracker.track, seed, took_s, path, link.rejected, reception()
+        )
+        journal = None if recording.journal is None else recording.journal.problem
+        summary = _with_problem(summary, recorder.problem, journal, *(record.problem for record in shielded))
+        recorder.add_metadata(SUMMARY, {"json": summary.json().decode()})
+        return summary
+
     with recorder:
-        last_resort = LastResort(link, clock, flight.ids, say)
         records: tuple[tuple[str, Record], ...] = (
             ("the last resort", last_resort),
+            ("the flight's state", reached),
             ("the truth", truth),
             ("the track", tracker),
             ("the recording", recorder),
             *(("the display", display) for display in watching(flight)),
         )
         shielded = [Shielded(record, name, say) for name, record in records]
-        with last_resort:
-            state = fly(
-                Tap(link, clock, recorder),
-                clock,
-                flight,
-                shielded,
-                period_ns=scenario.time.period_ns,
-                events=operator.events,
-            )
-        took_s = time.perf_counter() - began
-        track = tracker.track
-        path = (out / RECORDING).resolve()
-        summary = _summary(name, scenario, state, track, seed, took_s, path, link.rejected, reception())
-        journal = None if recording.journal is None else recording.journal.problem
-        others = (journal, *(record.problem for record in shielded))
-        recorder.add_metadata(SUMMARY, {"json": _with_problem(summary, recorder.problem, *others).json().decode()})
-    return _written(_with_problem(summary, recorder.problem, *others), track if pictured else None, scenario, out)
+        try:
+            with last_resort:
+                fly(noted, clock, flight, shielded, period_ns=scenario.time.period_ns, events=operator.events)
+        except BaseException as error:
+            with suppress(Exception):  # that it failed is what there is to be raised
+                told(_failure(error)).save(out)
+            raise
+        summary = told()
+    summary = _with_problem(summary, recorder.problem)
+    return _written(summary, tracker.track if pictured else None, scenario, out)
+
+
+class _Reached:
+    """A record that keeps how far the flight came."""
+
+    def __init__(self, state: FlightState) -> None:
+        self.state = state
+
+    def tick(self, tick: Tick) -> None:
+        self.state = tick.state
+
+
+def _failure(error: BaseException) -> str:
+    if isinstance(error, KeyboardInterrupt):
+        return "ended at once by Ctrl-C: its vehicles were not told to land"
+    return f"the flight failed: {in_words(error)}; its vehicles were told to land"
 
 
 def _with_problem(summary: Summary, *problems: str | None) -> Summary:
@@ -161,6 +185,7 @@ def _summary(
     name: str,
     scenario: Scenario,
     state: FlightState,
+    failure: str | None,
     track: Track | None,
     seed: int | None,
     took_s: float,
@@ -171,7 +196,7 @@ def _summary(
     result = None if track is None else score(track, scenario)
     closest = None if track is None else min_separation(track.position)
     simulated_s = state.tick * scenario.time.period_s
-    problem = state.problem or collision(closest)
+    problem = "; ".join(filter(None, (state.problem or collision(closest), failure))) or None
     return Summary(
         scenario=name,
         controller=scenario.control.rule,

@@ -370,6 +370,8 @@ def test_a_second_ctrl_c_ends_at_once_and_the_recording_is_whole(tmp_path):
     assert process.returncode == 130
     assert "Traceback" not in err
     assert decide_again(tmp_path / "run.mcap").difference is None
+    problem = orjson.loads((tmp_path / "summary.json").read_bytes())["problem"]
+    assert problem == "ended at once by Ctrl-C: its vehicles were not told to land"
 
 
 def test_a_polite_kill_lands_the_swarm_too(tmp_path):

@@ -1,12 +1,14 @@
 """A flight whose own code fails: other code tells its vehicles to land; who only watches takes nothing with it."""
 
+import re
 from collections import Counter
 from types import SimpleNamespace
 
 import numpy as np
 import orjson
 import pytest
-from flights import SHORT, Beside, Saying, failing, scratch
+from flights import SHORT, Beside, Counting, Saying, failing, fly_and_record, messages, recorded, scratch
+from mcap.reader import SeekingReader
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from gcs import session
@@ -14,7 +16,13 @@ from gcs.emergency import PAUSE_S, ROUNDS, LastResort
 from gcs.flight import Flight
 from gcs.lockstep import Lockstep
 from gcs.loop import fly
+from gcs.recording import sources, writer
+from gcs.recording.files import SUMMARY
+from gcs.recording.mcap_chunk import Filling
 from gcs.recording.mcap_file import McapFile
+from gcs.recording.own_topics import OwnTopics
+from gcs.recording.viewers import Viewers
+from gcs.recording.writer import Tap
 from gcs.session import flown
 from gcs.telemetry import Swarm, observe
 from scenarios import load
@@ -35,7 +43,7 @@ def in_lockstep(events=tuple, *, link=lambda world: world, watching=(), said=Non
     words = [] if said is None else said
     try:
         summary = flown(
-            "demo", scenario, link(world), world, seed=1, out=folder, operator=Saying(events),
+            "demo", scenario, link(world), world, seed=1, out=folder, operator=Saying(events), pictured=False,
             watching=lambda _flight: watching, say=words.append,
         )  # fmt: skip
     except Exception as error:
@@ -118,15 +126,57 @@ def test_without_the_last_resort_they_would_have_held_first():
     assert "land" not in modes(seen(world))
 
 
-def test_the_operators_second_ctrl_c_lands_nothing_as_it_was_told():
-    scenario = load("demo", overrides=SHORT)
-    world = Lockstep.of(scenario, seed=1)
-    with pytest.raises(KeyboardInterrupt):
-        flown(
-            "demo", scenario, world, world, seed=1, out=scratch(), watching=lambda _flight: (),
-            operator=Saying(failing(MISSION_TICK, KeyboardInterrupt())),
-        )  # fmt: skip
+def ended_by(error, folder):
+    """A demo that an error ends in its mission: the link it was flown over, and the world."""
+    links = []
+
+    def through(world, _clock):
+        links.extend((Counting(world), world))
+        return links[0]
+
+    with pytest.raises(type(error)):
+        fly_and_record("demo", *SHORT, out=folder, through=through, events=failing(MISSION_TICK, error))
+    return links
+
+
+def problem_told(folder):
+    """In the recording, and in summary.json, which are one."""
+    with (folder / "run.mcap").open("rb") as stream:
+        told = {record.name: record.metadata for record in SeekingReader(stream).iter_metadata()}[SUMMARY]["json"]
+    assert orjson.loads(told) == orjson.loads((folder / "summary.json").read_bytes())
+    return orjson.loads(told)["problem"]
+
+
+def test_a_flight_that_failed_says_why_and_is_recorded_to_the_end_of_what_was_sent_and_heard(tmp_path):
+    link, _ = ended_by(defect(), tmp_path)
+    raw = [(topic, data) for topic, _, data in messages(tmp_path / "run.mcap") if topic.endswith("/raw")]
+    ours = "/mavlink/255_190/raw"
+    assert [data for topic, data in raw if topic == ours] == [frame for _, frame in link.sent]
+    assert [data for topic, data in raw if topic != ours] == [frame.raw for frame in link.received]
+    last_told = dialect.MAVLink(None).decode(bytearray(raw[-1][1]))
+    assert last_told.param1 == 1  # DO_SET_MODE, to land
+    failed_ns = [time_ns for topic, time_ns, _ in messages(tmp_path / "run.mcap") if topic == "/tick"][-1]
+    assert link.received[-1].time_ns - failed_ns > 0.9 * ROUNDS * PAUSE_S * 1e9
+    assert re.fullmatch(
+        r"the flight failed: ZeroDivisionError: a defect \(flights.py, line \d+\); its vehicles were told to land",
+        problem_told(tmp_path),
+    )
+
+
+def test_the_operators_second_ctrl_c_lands_nothing_as_it_was_told_and_is_the_flights_problem(tmp_path):
+    _, world = ended_by(KeyboardInterrupt(), tmp_path)
     assert "land" not in modes(seen(world))
+    assert problem_told(tmp_path) == "ended at once by Ctrl-C: its vehicles were not told to land"
+
+
+def test_what_notes_the_landing_keeps_no_frame_of_it_from_leaving():
+    class Broken:
+        def __getattr__(self, name):
+            raise defect()
+
+    wire = Wire()
+    LastResort(Tap(wire, wire, Broken()), wire, (1, 2), say=str).land()
+    assert len(wire.sent) == 2 * ROUNDS
 
 
 class Wire:
@@ -257,21 +307,77 @@ def test_the_operators_second_ctrl_c_passes_a_display():
         )  # fmt: skip
 
 
-@pytest.mark.parametrize("method", ["channel", "extend", "flush", "finish"])
-def test_a_defect_in_the_recording_is_said_at_once_and_does_not_end_the_flight(method, monkeypatch):
-    calls, sound = iter(range(10**9)), getattr(McapFile, method)
+def unsound(monkeypatch, whose, name, *, after):
+    """From so many calls on this fails."""
+    calls, sound = iter(range(10**9)), getattr(whose, name)
 
-    def unsound(*words, **options):
-        if next(calls) >= 10 or method == "finish":
+    def code(*words, **options):
+        if next(calls) >= after:
             raise IndexError("a defect")
         return sound(*words, **options)
 
-    monkeypatch.setattr(McapFile, method, unsound)
+    monkeypatch.setattr(whose, name, code)
+
+
+@pytest.mark.parametrize(
+    ("method", "after", "word"), [("channel", 10, "raw frames"), ("extend", 10, "raw frames"),
+    ("flush", 2, "recording stopped"), ("finish", 0, "recording stopped")],
+)  # fmt: skip
+def test_a_defect_in_the_recording_is_said_at_once_and_does_not_end_the_flight(method, after, word, monkeypatch):
+    unsound(monkeypatch, McapFile, method, after=after)
     said = []
     _, summary = in_lockstep(said=said)
     assert summary.heading_error_deg is not None
-    assert "the recording stopped: IndexError: a defect" in summary.problem
-    assert sum("the recording stopped" in words for words in said) == 1
+    assert word in summary.problem
+    assert "IndexError: a defect" in summary.problem
+    assert sum(word in words for words in said) == 1
+    assert len(said) <= 4  # raw frames, our topics, viewers', ticks
+
+
+VIEWERS = ("/tf", "/swarm/scene", "/log", "/uav/1/fix")
+STATES = ("/swarm/state", "/setpoint", "/mission", "/trust", "/uav/1/state")
+FAILS_AT = 60
+
+
+@pytest.mark.parametrize(
+    ("whose", "name", "word", "missing"),
+    [
+        (Viewers, "of", "topics for viewers are", VIEWERS),
+        (OwnTopics, "of", "our own topics are", (*STATES, "/truth/pose")),
+        (writer, "pose_of", "true places are", ("/truth/pose",)),
+        (sources, "tick_topic", "ticks are", ("/tick",)),
+    ],
+)
+def test_a_defect_in_one_kind_of_topics_costs_them_and_nothing_else(monkeypatch, whose, name, word, missing, tmp_path):
+    undisturbed = messages(recorded("demo", *SHORT).path)
+    unsound(monkeypatch, whose, name, after=FAILS_AT)
+    said = []
+    flight = fly_and_record("demo", *SHORT, out=tmp_path, say=said.append)
+    held = messages(flight.path)
+    failed_ns = [time_ns for topic, time_ns, _ in undisturbed if topic == "/tick"][FAILS_AT]
+    kept = set(held)
+    lost = [message for message in undisturbed if message not in kept]
+    assert {time_ns >= failed_ns for _, time_ns, _ in lost} == {True}
+    assert {topic for topic, _, _ in lost} >= set(missing)
+    assert [message for message in undisturbed if message in kept] == held
+    assert not [topic for topic, time_ns, _ in held if topic in missing and time_ns >= failed_ns]
+    assert [words.startswith(f"gcs: {flight.path}: {word} missing from here on: IndexError") for words in said] == [
+        True
+    ]
+    assert flight.summary.problem == said[0].removeprefix("gcs: ")
+    with flight.path.open("rb") as stream:
+        assert SeekingReader(stream, validate_crcs=True).get_summary().statistics.message_count == len(held)
+
+
+def test_a_recording_that_a_defect_stopped_has_an_end_and_says_why(monkeypatch, tmp_path):
+    unsound(monkeypatch, Filling, "packed", after=5)
+    flight = fly_and_record("demo", *SHORT, out=tmp_path)
+    with flight.path.open("rb") as stream:
+        reader = SeekingReader(stream, validate_crcs=True)
+        told = {record.name: record.metadata for record in reader.iter_metadata()}
+        assert reader.get_summary().statistics.chunk_count == 5
+    assert "the recording stopped: IndexError: a defect" in orjson.loads(told[SUMMARY]["json"])["problem"]
+    assert messages(flight.path) == messages(recorded("demo", *SHORT).path)[: len(messages(flight.path))]
 
 
 def test_a_flight_with_a_failed_display_is_recorded_as_one_without():

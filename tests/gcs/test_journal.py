@@ -155,7 +155,7 @@ def test_it_takes_nobodys_place(tmp_path, make):
 
 
 def test_what_the_last_resort_sends_is_in_it(tmp_path):
-    """The recording ends with the loop; who lands the fleet then writes in the journal alone."""
+    """And in the recording."""
     sent = []
     with Journal(tmp_path / "run.tlog", silent) as journal:
         world = Lockstep.of(load("demo"), seed=1)
@@ -175,6 +175,6 @@ def test_what_the_last_resort_sends_is_in_it(tmp_path):
             )
     noted = [entry.raw for entry in entries(tmp_path / "run.tlog")]
     assert noted == [frame for _, frame in link.sent]
-    recorded = [data for topic, _, data in messages(tmp_path / "run.mcap") if topic == "/mavlink/255_190/raw"]
-    assert noted[: len(recorded)] == recorded
-    assert len(noted) - len(recorded) > 100
+    held = messages(tmp_path / "run.mcap")
+    assert [data for topic, _, data in held if topic == "/mavlink/255_190/raw"] == noted
+    assert sum(topic == "/mavlink/255_190/raw" for topic, _, _ in held[-2000:]) > 100
