@@ -10,7 +10,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from gcs.recording.reader import Flown, UnreadableRecording, located, read
+from gcs.recording.reader import Flown, UnreadableRecording, read, shown
 from gcs.scoring import Score, score
 from gcs.summary import trust_of
 from gcs.words import controller_name, ending, faults, robots
@@ -28,7 +28,7 @@ def compare(recordings: Sequence[Path], *, picture: Path, console: Any) -> None:
         raise UnreadableRecording("compare: name at least one recording, or the folder of a run")
     if picture.suffix not in FORMATS:
         raise UnwritablePicture(f"--out {picture}: must end in {', '.join(FORMATS)}")
-    flights = [read(located(path)) for path in recordings]
+    flights = [read(shown(path)) for path in recordings]
     console.print(_table(flights))
     for flight in flights:
         console.print(f"recording  {flight.path.resolve()}", highlight=False, soft_wrap=True, markup=False)

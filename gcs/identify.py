@@ -10,7 +10,7 @@ import numpy as np
 import orjson
 
 from gcs.loop import Tick, fly
-from gcs.recording.reader import SteeredTick, UnreadableRecording, instead_of_scenario, located, read, steered
+from gcs.recording.reader import SteeredTick, UnreadableRecording, instead_of_scenario, read, shown, steered
 from gcs.trial import ToItsReadOut
 from scenarios import Scenario, ScenarioError, load
 from trustr.identification import SETTLING_S, Identified, Sample, identify
@@ -43,7 +43,7 @@ def of_scenario(scenario: Scenario, *, seeds: int, console: Any) -> Identified:
 
 def of_recording(path: Path) -> Identified:
     """Identify the vehicles of a recording in which nothing failed. Raises UnreadableRecording."""
-    path = located(path)
+    path = shown(path)
     scenario = read(path).scenario
     wrong = [fault for fault in scenario.fault if fault.blamed is not None]
     if wrong:

@@ -18,7 +18,7 @@ from gcs.recording.channels import RAW, Channels
 from gcs.recording.contents import frame_of, frames, records
 from gcs.recording.copied import Copy
 from gcs.recording.mcap_file import McapFile
-from gcs.recording.reader import UnreadableRecording, located
+from gcs.recording.reader import UnreadableRecording, shown
 from gcs.recording.table_files import MEANINGS, CsvFile, TableFile, TableFolder, parquet_file
 from gcs.recording.tidy import Row, Tidy, of_frame
 from gcs.recording.tlog import packed
@@ -34,7 +34,7 @@ def export(path: Path, *, to: Form, out: Path | None, console: Any) -> int:
 
     Raises UnreadableRecording, Unwritable where something is there already, BadUsageError where an extra is missing.
     """
-    path = located(path)
+    path = shown(path)
     if out is None:
         out = path.with_name(f"{path.stem}{NAMES[to]}")
     check_free(out)

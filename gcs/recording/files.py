@@ -46,6 +46,17 @@ def whole_of(path: Path) -> Path | None:
     return None if named is None else path.with_name(f"{named[1]}{path.suffix}")
 
 
+def remainder(recording: Path) -> str | None:
+    """That a file is not all of its recording, in one sentence; None where it is."""
+    parts, whole = further_parts(recording), whole_of(recording)
+    if parts:
+        names = ", ".join(part.name for part in parts)
+        return f"{recording}: goes on in {names}, of which nothing is shown; {recovering(recording)} joins all"
+    if whole is not None and (whole.exists() or further_parts(whole)):
+        return f"{recording}: a part of {whole.name}, and nothing else is shown; {recovering(whole)} joins all"
+    return None
+
+
 def journal(recording: Path) -> Path:
     """The log of all frames beside it, in flights with real links."""
     return recording.with_suffix(".tlog")

@@ -16,12 +16,13 @@ from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader, SeekingReader
 from pydantic import ValidationError
 
+from gcs.console import say
 from gcs.events import Event, Rating
 from gcs.gate import LOST_NS
 from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM
 from gcs.mission import plan
 from gcs.recording.channels import RAW, raw_topic
-from gcs.recording.files import FAULTS, MADE, METADATA, SCENARIO, SUMMARY, recovering
+from gcs.recording.files import FAULTS, MADE, METADATA, SCENARIO, SUMMARY, recovering, remainder
 from gcs.recording.mcap_file import MAGIC
 from gcs.track import Parts, Point, Track
 from scenarios import Scenario, names
@@ -106,6 +107,15 @@ class RecordedTick(NamedTuple):
 def located(path: Path) -> Path:
     """A recording, named by itself or by the folder of its run."""
     return path / RECORDING if path.is_dir() else path
+
+
+def shown(path: Path) -> Path:
+    """The same, for commands that show one file of a recording: on stderr is said if there are others."""
+    path = located(path)
+    others = remainder(path)
+    if others is not None:
+        say(f"gcs: {others}")
+    return path
 
 
 def instead_of_scenario(name: str) -> Path | None:

@@ -10,7 +10,7 @@ from gcs.choices import BadUsageError
 from gcs.guard import DONE
 from gcs.output import whole
 from gcs.recording.history import load
-from gcs.recording.reader import located
+from gcs.recording.reader import located, shown
 from gcs.report.page import page
 
 PAGE = "report.html"
@@ -27,7 +27,7 @@ def report(recordings: Sequence[Path], *, out: Path | None, console: Any) -> int
     target = located(recordings[0]).with_name(PAGE) if out is None else out / PAGE if out.is_dir() else out
     if target.suffix not in SUFFIXES:
         raise BadUsageError(f"--out {target}: must end in {' or '.join(SUFFIXES)}")
-    html = page([load(path) for path in recordings])
+    html = page([load(shown(path)) for path in recordings])
     with whole(target) as unfinished:
         unfinished.write_text(html, encoding="utf-8")
     console.print(f"report     {target.resolve()}", highlight=False, soft_wrap=True, markup=False)

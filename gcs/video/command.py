@@ -9,7 +9,7 @@ from gcs.choices import BadUsageError
 from gcs.console import report
 from gcs.guard import DONE
 from gcs.output import whole
-from gcs.recording.reader import located
+from gcs.recording.reader import shown
 
 SLOWEST, FASTEST = 0.1, 100.0
 """Recorded seconds a second of film."""
@@ -19,7 +19,7 @@ def video(recording: Path, *, out: Path | None, blind: bool, speed: float, conso
     """Render a recording; console shows how far it is. Raises UnreadableRecording, BadUsageError and Unwritable."""
     if not SLOWEST <= speed <= FASTEST:
         raise BadUsageError(f"--speed {speed:g}: must be {SLOWEST:g} to {FASTEST:g}")
-    file = located(recording)
+    file = shown(recording)
     out = file.with_name("blind.mp4" if blind else "video.mp4") if out is None else out
     if out.suffix != ".mp4":
         raise BadUsageError(f"--out {out}: must end in .mp4")
