@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import orjson
 import pytest
-from flights import SHORT, Beside, Severed, failing, fly_and_record, recorded, rewritten, told
+from flights import SHORT, Beside, Severed, failing, fly_and_record, recorded, rewritten, told, unended
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -284,12 +284,18 @@ def test_a_rule_that_asks_for_no_trust_distrusts_nobody():
         assert words(averaged, Kind.DISTRUST) == []
 
 
-def test_a_recording_that_ends_before_its_flight_says_so_at_its_last_tick(tmp_path):
+def test_a_recording_that_ends_before_its_flight_says_so_at_its_last_tick():
+    history = load(unended(recorded("demo", *SHORT).path))
+    assert (history.problem, history.summary) == (CUT_SHORT, None)
+    assert words(history, Kind.PROBLEM) == [(len(history.number) - 1, CUT_SHORT)]
+
+
+def test_what_broke_the_flight_off_stands_at_its_last_tick(tmp_path):
     with pytest.raises(ZeroDivisionError):
         fly_and_record("demo", out=tmp_path, events=failing(31, ZeroDivisionError()))
     history = load(tmp_path)
-    assert (history.problem, history.summary) == (CUT_SHORT, None)
-    assert words(history, Kind.PROBLEM) == [(30, CUT_SHORT)]
+    assert "ZeroDivisionError" in history.problem
+    assert words(history, Kind.PROBLEM) == [(30, history.problem)]
 
 
 def test_a_problem_stands_where_the_flight_turned_to_its_end():
