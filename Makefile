@@ -7,6 +7,7 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 RUNS   := runs/$(shell date +%Y%m%dT%H%M%S)-side-by-side
 JOBS   ?= 2
+WAITERS ?= 4
 
 .PHONY: setup fly test check soak bench clean
 
@@ -23,18 +24,22 @@ fly: setup
 	$(BIN)/gcs run emergency --controller trust-r --trust auto --out $(RUNS)/trust-r
 	$(BIN)/gcs compare $(RUNS)/average $(RUNS)/trust-r --out $(RUNS)/comparison.png
 
+# What waits for real time runs by itself, more at once than there are cores; what measures it has the machine alone.
+marked = $(shell grep -rl 'mark\.$(1)' tests)
+
 test: setup
-	$(BIN)/pytest --numprocesses $(JOBS) -m "not alone"
-	$(BIN)/pytest -m alone
+	$(BIN)/pytest $(TRYING) --numprocesses $(JOBS) --dist worksteal -m "not wall_clock and not alone"
+	$(BIN)/pytest $(TRYING) --numprocesses $(WAITERS) --dist loadfile -m "wall_clock and not alone" $(call marked,wall_clock)
+	$(BIN)/pytest $(TRYING) -m alone $(call marked,alone)
+
+soak: export TRUSTR_PROFILE = soak
+soak: TRYING = --timeout 7200
+soak: test
 
 check: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-
-soak: setup
-	TRUSTR_PROFILE=soak $(BIN)/pytest --numprocesses $(JOBS) --timeout 7200 -m "not alone"
-	TRUSTR_PROFILE=soak $(BIN)/pytest --timeout 7200 -m alone
 
 bench: setup
 	$(BIN)/python -m tests.benchmarks
