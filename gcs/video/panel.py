@@ -18,7 +18,7 @@ from gcs.video.insight import Insight
 from gcs.video.motion import AFTER_S
 from gcs.video.trust_bars import TrustBars
 from gcs.video.view import HEIGHT, Box
-from gcs.words import controller_name
+from gcs.words import controller_name, ending, measured
 
 TITLE_WIDTH, NAME_WIDTH, TELLING_WIDTH = 44, 36, 33
 """Letters in a line."""
@@ -41,9 +41,7 @@ class Panel:
         self._read_out_s = plan(history.scenario).read_out_s
         self._title = _wrapped(history.scenario.title, TITLE_WIDTH)
         self._bars = TrustBars(history, insight, Box(self._left, box.bottom, self._right, BARS_UP))
-        self._happenings = [
-            h for h in history.happenings if h.tick >= begins and (insight.trusting or h.kind is not Kind.DISTRUST)
-        ]
+        self._happenings = [happening for happening in history.happenings if happening.tick >= begins]
         self._ends = _ends(history, self._read_out_s)
         self._verdict = list(_verdict(history))
         self._rule = VERDICT_PX + 18.0 * len(self._verdict)
@@ -135,19 +133,11 @@ def _when(happening: Happening) -> str:
 
 def _verdict(history: History) -> Iterator[tuple[str, str]]:
     """Lines and their colours, the first large."""
-    if history.problem is not None:
-        yield "NOT COMPLETED", FAILED
-        for line in _wrapped(history.problem, TITLE_WIDTH):
-            yield line, DARK
-        return
     result = None if history.track is None else score(history.track, history.scenario)
-    if result is None:
-        yield "NO SCORE", FAILED
-        yield "it ended before its read-out", DARK
-        return
-    expect = history.scenario.expect
-    yield ("PASSED", PASSED) if result.passed else ("FAILED", FAILED)
-    yield f"heading off by {result.heading_error_deg:.1f}° (allowed {expect.heading_error_deg:g}°)", DARK
-    yield f"{result.distance_to_target_m:.1f} m from the target (allowed {expect.distance_to_target_m:g} m)", DARK
-    if result.min_separation_m < expect.min_separation_m:
-        yield f"as close as {result.min_separation_m:.2f} m (allowed {expect.min_separation_m:g} m)", DARK
+    ended = ending(history.problem, None if result is None else result.passed)
+    yield ended.word.upper(), PASSED if ended.good else FAILED
+    for line in _wrapped(ended.why, TITLE_WIDTH):
+        yield line, DARK
+    if result is not None and history.problem is None:
+        for line in measured(result, history.scenario):
+            yield line, DARK
