@@ -95,16 +95,19 @@ def flown(
     noted = Tap(link, clock, recorder)
     last_resort, reached = LastResort(noted, clock, flight.ids, say), _Reached(flight.start())
 
-    def told(failure: str | None = None) -> Summary:
-        """What came of it, in the recording too."""
+    def came_of_it(failure: str | None = None) -> Summary:
+        """Without what failed beside the flight; the recording is told both."""
         took_s, path = time.perf_counter() - began, (out / RECORDING).resolve()
         summary = _summary(
             name, scenario, reached.state, failure, tracker.track, seed, took_s, path, link.rejected, reception()
         )
-        journal = None if recording.journal is None else recording.journal.problem
-        summary = _with_problem(summary, recorder.problem, journal, *(record.problem for record in shielded))
-        recorder.add_metadata(SUMMARY, {"json": summary.json().decode()})
+        recorder.add_metadata(SUMMARY, {"json": beside(summary).json().decode()})
         return summary
+
+    def beside(summary: Summary) -> Summary:
+        """With what failed beside the flight, so far."""
+        journal = None if recording.journal is None else recording.journal.problem
+        return _with_problem(summary, recorder.problem, journal, *(record.problem for record in shielded))
 
     with recorder:
         records: tuple[tuple[str, Record], ...] = (
@@ -121,11 +124,10 @@ def flown(
                 fly(noted, clock, flight, shielded, period_ns=scenario.time.period_ns, events=operator.events)
         except BaseException as error:
             with suppress(Exception):  # that it failed is what there is to be raised
-                told(_failure(error)).save(out)
+                beside(came_of_it(_failure(error))).save(out)
             raise
-        summary = told()
-    summary = _with_problem(summary, recorder.problem)
-    return _written(summary, tracker.track if pictured else None, scenario, out)
+        summary = came_of_it()
+    return _written(beside(summary), tracker.track if pictured else None, scenario, out)
 
 
 class _Reached:
