@@ -39,8 +39,9 @@ def cpu(scenario: Scenario) -> tuple[float, dict[str, float]]:
 
 def recorded(scenario: Scenario, how: Recording, folder: Path) -> tuple[int, list[Message], float]:
     """Bytes of a recording, what is in it, and vehicle-minutes flown."""
-    ticks = flight(scenario, how, folder)[1]
     path = folder / RECORDING
+    path.unlink(missing_ok=True)
+    ticks = flight(scenario, how, folder)[1]
     with opened(path) as recording:
         messages = list(recording.messages)
     return path.stat().st_size, messages, ticks * scenario.time.period_s * scenario.swarm.count / 60
