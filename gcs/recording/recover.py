@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -21,7 +22,7 @@ from gcs.recording.files import DROPPED, METADATA, PART, SCENARIO
 from gcs.recording.gathered import Gathered, PartFile, gathered
 from gcs.recording.mcap_file import McapFile
 from gcs.recording.merge import completed
-from gcs.recording.reader import UnreadableRecording, located
+from gcs.recording.reader import DAMAGE, UnreadableRecording, located
 from gcs.recording.recovery import RECOVERED, Part, Recovery
 from gcs.recording.seal import SEAL, sealed
 from gcs.recording.strays import JOURNAL
@@ -115,8 +116,10 @@ class _Log:
 
 
 def _of_another(result: Tally) -> str:
-    same = "none is" if result.shared == 0 else f"only {result.shared} are"
-    return f"it is the journal of another flight: of {result.due} frames that both should have, {same} in both"
+    what = "it is the journal of another flight"
+    if result.due == 0:
+        return f"{what}: none of its frames was noted while the recording was"
+    return f"{what}: of {result.due} frames that both should have, both have {result.shared}"
 
 
 def _needless(found: Gathered) -> Recovery | None:
@@ -162,7 +165,7 @@ class _About:
         self.dropped = int(dropped) if dropped.isdecimal() else 0
         """Messages that no part holds."""
         scenario = next((a.data for a in self.attachments if a.name == SCENARIO), None)
-        self.period_ns = round((PERIOD_S if scenario is None else orjson.loads(scenario)["time"]["period_s"]) * 1e9)
+        self.period_ns = round(_period_s(scenario) * 1e9)
         self.lacking = []
         if scenario is None:
             self.lacking.append("its scenario, without which only export and a replay to other tools can read it")
@@ -172,6 +175,13 @@ class _About:
     def messages(self) -> Iterator[Message]:
         """Of all parts, in their order."""
         return chain.from_iterable(left.messages() for left in self._left)
+
+
+def _period_s(scenario: bytes | None) -> float:
+    """What it says, be it of an older version; another program's says nothing."""
+    with suppress(*DAMAGE):
+        return PERIOD_S if scenario is None else float(orjson.loads(scenario)["time"]["period_s"])
+    return PERIOD_S
 
 
 def _write(path: Path, messages: Iterable[Message], about: _About, recovery: Recovery) -> None:

@@ -139,7 +139,7 @@ class Recovery:
             "messages_dropped": str(self.dropped),
             "parts_missing": ", ".join(map(str, self.missing)),
             "lost": ", ".join(self.lacking),
-            "words": "; ".join(words for _name, words in self.lines()),
+            "words": "; ".join(f"{name}: {words}" for name, words in self.lines()),
         }
 
     def lines(self) -> Iterator[tuple[str, str]]:

@@ -9,6 +9,11 @@ from gcs.recording.channels import RAW, Message
 from gcs.recording.merge import completed
 from gcs.recording.tlog import Entry
 
+ALIKE = 0.9
+"""Of the frames that both should have: simulated flights of one scenario, which begin at the same moment whatever their
+seed, have up to three quarters in common.
+"""
+
 
 @dataclass(frozen=True, slots=True)
 class Tally:
@@ -29,7 +34,7 @@ class Tally:
     @property
     def of_one_flight(self) -> bool:
         """Whether the journal is the recording's: nothing but its frames tells."""
-        return self.shared > 0 and 2 * self.shared >= self.due
+        return self.shared > 0 and self.shared >= ALIKE * self.due
 
 
 def tally(messages: Iterable[Message], journal: Sequence[Entry], *, period_ns: int) -> Tally:

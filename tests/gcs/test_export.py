@@ -13,6 +13,7 @@ import polars as pl
 import pytest
 from flights import SHORT, digest, messages, recorded, scratch
 from mcap.reader import make_reader
+from mcap.writer import Writer
 from rich.console import Console
 
 from gcs.recording.decoded import decoded
@@ -232,6 +233,52 @@ def test_a_tlog_is_imported_not_exported(gcs, exported, tmp_path):
         2,
         f"gcs: {tmp_path / 'mav.tlog'}: a log of frames; gcs log import makes a recording of it\n",
     )
+
+
+def written_elsewhere(path, *, schema="another.Tick"):
+    """Another program's file, with topics called like ours."""
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(library="another")
+        channel = writer.register_channel("/tick", "json", writer.register_schema(schema, "jsonschema", b"{}"))
+        writer.add_message(channel, 5, b'{"of": "a clock"}', 5)
+        writer.finish()
+    return path
+
+
+@pytest.mark.parametrize(
+    ("form", "why"),
+    [
+        ("tlog", "holds no MAVLink frame: there is nothing to write to a .tlog"),
+        ("csv", "holds neither frames nor topics of ours: there is no table to write"),
+    ],
+)
+def test_of_a_file_with_nothing_of_ours_nothing_is_written(gcs, tmp_path, form, why):
+    path = written_elsewhere(tmp_path / "other.mcap")
+    code, out, said = gcs("log", "export", path, "--to", form)
+    assert (code, out, said) == (2, "", f"gcs: {path}: {why}\n")
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_topic_of_another_version_is_refused_in_a_sentence(gcs, tmp_path):
+    path = written_elsewhere(tmp_path / "other.mcap", schema="trustr.Tick")
+    code, _, said = gcs("log", "export", path, "--to", "csv")
+    assert (code, said) == (2, f"gcs: {path}: /tick is not as this version writes it\n")
+
+
+@pytest.mark.parametrize("command", [("log", "export", "--to", "tlog"), ("report",)])
+def test_of_a_recording_in_several_files_it_is_said_that_one_of_them_is_shown(gcs, flight, tmp_path, command):
+    for name in ("run.mcap", "run.part2.mcap"):
+        (tmp_path / name).write_bytes(flight.path.read_bytes())
+    code, _, said = gcs(*command, tmp_path)
+    assert code == 0
+    assert said == (
+        f"gcs: {tmp_path / 'run.mcap'}: goes on in run.part2.mcap, of which nothing is shown; "
+        f"gcs log recover {tmp_path / 'run.mcap'} joins all\n"
+    )
+    (tmp_path / "run-frames.tlog").unlink(missing_ok=True)
+    _, _, said = gcs("log", "export", "--to", "tlog", tmp_path / "run.part2.mcap")
+    assert "run.part2.mcap: a part of run.mcap, and nothing else is shown; gcs log recover" in said
 
 
 def test_without_pyarrow_there_is_csv(gcs, flight, tmp_path, monkeypatch):

@@ -155,6 +155,12 @@ def test_what_is_no_log_is_refused_in_a_sentence(gcs, tmp_path):
     assert (code, said) == (2, f"gcs: {tmp_path / 'absent.tlog'}: cannot be read: No such file or directory\n")
 
 
+def test_a_recording_needs_no_import(flight, gcs, tmp_path):
+    code, _, said = gcs("log", "import", flight.path, "--out", tmp_path / "out.mcap")
+    assert (code, said) == (2, f"gcs: {flight.path}: an MCAP file already: there is nothing to import\n")
+    assert not list(tmp_path.iterdir())
+
+
 def test_what_is_mostly_something_else_is_told(gcs, tmp_path):
     (tmp_path / "mav.tlog").write_bytes(log_of(START_US) + bytes(1000))
     code, _, said = gcs("log", "import", tmp_path / "mav.tlog")

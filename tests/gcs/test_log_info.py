@@ -1,11 +1,15 @@
 """`gcs log info`: what is in a file, for a person and as JSON."""
 
+import io
+
 import orjson
 import pytest
 from flights import SHORT, fly_and_record, messages, recorded, told
 from mcap.writer import CompressionType, Writer
+from rich.console import Console
 
 from gcs.events import LAND
+from gcs.recording.info import show
 from gcs.recording.tlog import packed
 
 
@@ -130,6 +134,37 @@ def test_of_another_programs_file_topics_are_told(gcs, tmp_path, chunked):
     assert (topic["topic"], topic["of"], topic["messages"]) == ("/camera", "sensor/Image", 100)
     assert topic["rate_hz"] == pytest.approx(100 / 9.9)
     assert found["bytes_per_vehicle_minute"] is None
+
+
+def test_another_programs_records_that_are_called_like_ours_are_not_taken_for_ours(gcs, tmp_path):
+    with (tmp_path / "bag.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(library="another")
+        writer.add_metadata("summary", {"words": "fine"})
+        writer.add_metadata("trustr", {"seed": "a grain", "started": "once", "dropped_messages": "some"})
+        writer.add_metadata("recovered", {"by": "another"})
+        writer.add_attachment(0, 0, "scenario.json", "application/json", b'{"about": "a theatre"}')
+        writer.add_message(writer.register_channel("mav", "mavlink", 0), 5, b"no frame", 5)
+        writer.finish()
+    found = as_json(gcs, tmp_path / "bag.mcap")
+    assert (found["seed"], found["started"], found["recovered"], found["vehicles"]) == (None, None, None, 0)
+    assert gcs("log", "info", tmp_path / "bag.mcap")[0] == 0
+    whole = (tmp_path / "bag.mcap").read_bytes()
+    (tmp_path / "torn.mcap").write_bytes(whole[:-50])
+    for name in ("bag.mcap", "torn.mcap"):
+        assert gcs("log", "recover", tmp_path / name)[0] == 0
+
+
+@pytest.mark.parametrize("width", [40, 60, 80])
+def test_no_topic_is_broken_where_the_terminal_is_narrow(flight, width):
+    page = io.StringIO()
+    assert show(flight.path, as_json=False, console=Console(file=page, width=width)) == 0
+    lines = page.getvalue().splitlines()
+    assert max(map(len, lines)) <= width
+    if width >= 60:
+        assert {topic for topic, _, _ in messages(flight.path) if not topic.startswith(("/mavlink", "/uav"))} <= {
+            line.split()[0] for line in lines if line.strip().startswith("/")
+        }
 
 
 @pytest.mark.parametrize("name", ["run.mcap", "run.tlog"])

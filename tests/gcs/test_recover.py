@@ -14,6 +14,7 @@ from mcap import records
 from mcap.reader import SeekingReader
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.writer import Writer
 
 from gcs.output import Unwritable
 from gcs.recording.channels import RAW, Channel, Message, raw_topic
@@ -25,7 +26,9 @@ from gcs.recording.reader import SENT, UnreadableRecording, read
 from gcs.recording.recover import rebuilt
 from gcs.recording.salvage import salvage
 from gcs.recording.seal import sealed
-from gcs.recording.tlog import Entry, packed
+from gcs.recording.strays import JOURNAL
+from gcs.recording.tally import Tally
+from gcs.recording.tlog import Entries, Entry, packed
 from gcs.recording.writer import PROMPTLY_NS
 from gcs.replay.verify import decide_again
 from gcs.session import Recording
@@ -58,12 +61,18 @@ def chunks(small):
     return list(zip(ends, accumulate(counts), strict=True))
 
 
-def recovered(data, *, journal=None, **parts):
-    """What is made of these bytes, with those of a journal and of further parts: how, and its messages."""
+def folder_of(data, *, journal=None, **parts):
+    """A run's folder with these bytes of its recording, its journal and further parts."""
     folder = scratch()
     for name, content in {"run.mcap": data, "run.tlog": journal, **parts}.items():
         if content is not None:
             (folder / name).write_bytes(content)
+    return folder
+
+
+def recovered(data, *, journal=None, **parts):
+    """What is made of these bytes, with those of a journal and of further parts: how, and its messages."""
+    folder = folder_of(data, journal=journal, **parts)
     out = folder / "recovered.mcap"
     recovery = rebuilt(folder / "run.mcap", journal=None, out=out)
     return recovery, messages(out if recovery.out else folder / "run.mcap")
@@ -207,6 +216,50 @@ def is_within(few, many):
     return all(one in rest for one in few)
 
 
+def test_a_wrong_time_among_frames_that_read_alike_is_of_that_frame_alone():
+    """A heartbeat leaves for several vehicles at once."""
+    flying = Flying([(0, 1)] * 3)
+    first, *others = flying.journal
+    wrong = [first._replace(time_us=first.time_us + (1 << 41)), *others]
+    assert len(list(completed(flying.messages, wrong, period_ns=PERIOD_NS))) == len(flying.messages) + 1
+
+
+def test_a_damaged_time_in_a_journal_makes_no_frame(small, true):
+    messages, journal, rng = list(salvage(small.read_bytes()).messages()), journal_of(true), random.Random(4)
+    starts = [0, *accumulate(len(data) + 8 for topic, _, data in true if topic.endswith("/raw"))][:-1]
+    for start in (starts[0], starts[-1], *rng.choices(starts, k=40)):
+        wrong = bytearray(journal)
+        wrong[start + rng.randrange(8)] ^= 1 << rng.randrange(8)
+        entries = list(Entries(bytes(wrong), JOURNAL))
+        assert list(completed(messages, entries, period_ns=PERIOD_NS)) == messages
+
+
+def test_a_journal_of_another_flight_is_left_out_and_where_it_was_named_refused(small, true, gcs):
+    data = small.read_bytes()
+    other = b"".join(packed(entry.time_us * 1000, entry.raw) for entry in Flying([(3, 2)] * 20).journal)
+    torn = folder_of(data[: len(data) // 2], journal=other)
+    code, out, _ = gcs("log", "recover", torn, "--json")
+    told = orjson.loads(out)
+    assert (code, told["frames_added"], told["journal"]) == (0, 0, None)
+    assert "another flight" in told["left_out"][str(torn / "run.tlog")]
+    assert set(messages(torn / "run-recovered.mcap")) <= set(true)
+    code, _, err = gcs("log", "recover", torn, "--journal", torn / "run.tlog", "--out", torn / "named.mcap")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "it is the journal of another flight: none of its frames was noted while the recording was" in err
+    assert not (torn / "named.mcap").exists()
+    assert "nothing to recover" in gcs("log", "recover", folder_of(data, journal=other))[1]
+
+
+@pytest.mark.parametrize(
+    ("shared", "due", "same"),
+    [(0, 0, False), (0, 400, False), (2265, 3258, False), (3258, 3258, True), (95, 100, True)],
+)
+def test_flights_of_one_scenario_have_much_in_common_and_notes_of_one_flight_nearly_all(shared, due, same):
+    """The third: the demo, flown with seeds 1 and 2, and torn at 16 s."""
+    told = Tally(messages=5000, begin_ns=0, end_ns=16 * 10**9, added=0, shared=shared, due=due)
+    assert told.of_one_flight is same
+
+
 def test_a_torn_recording_with_its_journal_has_every_frame_and_is_decided_again_as_far_as_its_ticks_go(small, true):
     data = small.read_bytes()
     recovery, found = recovered(data[: len(data) // 2], journal=journal_of(true))
@@ -269,6 +322,39 @@ def test_parts_are_joined_and_what_the_disk_did_not_take_is_told(parts, true):
     assert f"{third} messages that the disk did not take" in load(recovery.out).recovered["words"]
 
 
+def test_parts_are_joined_in_the_order_that_they_tell_whatever_they_are_called(parts, true):
+    first, second, third = parts
+    recovery, found = recovered(second, **{"run.part2.mcap": first})
+    assert found == true[:third] + true[2 * third :]
+    assert [part.path.name for part in recovery.parts] == ["run.part2.mcap", "run.mcap"]
+
+
+def test_a_part_of_another_flight_is_left_out(parts, true):
+    first, second, third = parts
+    other = salvage(second)
+    for record in other.metadata:
+        record.metadata["started"] = "2001-01-01T00:00:00+00:00"
+    foreign = written(scratch() / "foreign", list(other.messages()), other, number=2, dropped=0, finish=False)
+    recovery, found = recovered(first, **{"run.part2.mcap": foreign, "run.part3.mcap": second})
+    assert found == true[:third] + true[2 * third :]
+    assert [(path.name, why) for path, why in recovery.left_out] == [("run.part2.mcap", "it is of another flight")]
+
+
+def test_a_part_that_is_missing_is_told_though_it_is_the_first(parts, true):
+    _, second, third = parts
+    recovery, found = recovered(None, **{"run.part2.mcap": second})
+    assert (found, recovery.missing) == (true[2 * third :], [1])
+    assert "part 1 of the recording: it is not there" in recovery.metadata()["words"]
+
+
+def test_whoever_names_a_part_is_sent_to_the_whole(parts, gcs):
+    first, second, _ = parts
+    folder = folder_of(first, **{"run.part2.mcap": second})
+    code, _, err = gcs("log", "recover", folder / "run.part2.mcap")
+    assert (code, err.count("\n")) == (2, 1)
+    assert f"gcs log recover {folder / 'run.mcap'} joins all" in err
+
+
 def test_the_frames_that_the_disk_did_not_take_come_from_the_journal(parts, true):
     first, second, third = parts
     recovery, found = recovered(first, journal=journal_of(true), **{"run.part2.mcap": second})
@@ -284,6 +370,36 @@ def test_a_whole_recording_needs_none_of_it(small, gcs):
     assert not small.with_name("run-recovered.mcap").exists()
     code, out, _ = gcs("log", "recover", small, "--json")
     assert (code, orjson.loads(out)["recovered"]) == (0, None)
+
+
+@pytest.mark.parametrize(
+    ("options", "vouched"),
+    [({}, True), ({"enable_crcs": False}, False), ({"use_chunking": False}, False)],
+    ids=["as usual", "without CRCs", "without chunks"],
+)
+def test_another_programs_file_that_is_whole_needs_none_of_it_and_is_not_called_damaged(
+    options, vouched, tmp_path, gcs
+):
+    with (tmp_path / "camera.mcap").open("wb") as stream:
+        writer = Writer(stream, **options)
+        writer.start(library="another")
+        channel = writer.register_channel("/camera", "cdr", writer.register_schema("sensor/Image", "ros2msg", b"x"))
+        for time_ns in range(100):
+            writer.add_message(channel, time_ns, b"pixels", time_ns)
+        writer.finish()
+    code, out, _ = gcs("log", "recover", tmp_path / "camera.mcap")
+    assert code == 0
+    assert "whole: 100 messages" in out
+    assert ("no CRC vouches for 100 of them" in out) is not vouched
+    assert "nothing to recover" in out
+    assert [path.name for path in tmp_path.iterdir()] == ["camera.mcap"]
+
+
+def test_an_imported_log_needs_none_of_it(true, gcs, tmp_path):
+    (tmp_path / "mav.tlog").write_bytes(journal_of(true))
+    assert gcs("log", "import", tmp_path / "mav.tlog")[0] == 0
+    code, out, _ = gcs("log", "recover", tmp_path / "mav.mcap")
+    assert (code, "nothing to recover" in out) == (0, True)
 
 
 def test_what_was_found_lost_and_written_is_told_in_words_and_as_json(small, true, gcs, tmp_path):
