@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import NamedTuple
 
@@ -31,9 +32,18 @@ class Message(NamedTuple):
     data: bytes
 
 
-def raw_topic(system: int, component: int) -> str:
+def raw_topic(system: int | str, component: int | str) -> str:
     """Of a sender's raw frames."""
     return f"/mavlink/{system}_{component}/raw"
+
+
+def raw_sender(topic: str) -> tuple[int, int] | None:
+    """System and component whose raw frames a topic has; None of any other topic."""
+    match = _RAW_TOPIC.fullmatch(topic)
+    return None if match is None else (int(match[1]), int(match[2]))
+
+
+_RAW_TOPIC = re.compile(raw_topic(r"(\d+)", r"(\d+)"))
 
 
 @cache

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -16,7 +15,7 @@ from pydantic import ValidationError
 
 from gcs.messages import GROUND_SYSTEM
 from gcs.recording import files
-from gcs.recording.channels import RAW, raw_topic
+from gcs.recording.channels import RAW, raw_sender, raw_topic
 from gcs.recording.contents import frame_of, mapped, records
 from gcs.recording.files import METADATA, SCENARIO, SUMMARY
 from gcs.recording.layouts import layout
@@ -102,8 +101,8 @@ class Inventory:
         """How many: by the scenario, else by who speaks."""
         if self.scenario is not None:
             return self.scenario.swarm.count
-        senders = {_SENDER.match(one.sort.topic) for one in self.listed if one.sort.encoding == RAW}
-        return len({int(sender[1]) for sender in senders if sender is not None} - {GROUND_SYSTEM})
+        senders = {raw_sender(one.sort.topic) for one in self.listed if one.sort.encoding == RAW}
+        return len({sender[0] for sender in senders if sender is not None} - {GROUND_SYSTEM})
 
     @property
     def bytes_per_vehicle_minute(self) -> float | None:
@@ -121,9 +120,6 @@ class Inventory:
         """The one beside it."""
         path = files.journal(self.path)
         return path if path != self.path and path.exists() else None
-
-
-_SENDER = re.compile(r"/mavlink/(\d+)_\d+/")
 
 
 def inventory(path: Path) -> Inventory:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from gcs.messages import GROUND_COMPONENT, GROUND_SYSTEM, HEARTBEAT
+from gcs.recording.channels import raw_sender
 from gcs.replay.index import Times
 from gcs.routes import introduces, of_station
 from wire.frames import Frame, Framer
@@ -18,7 +18,6 @@ Name = tuple[int, int]
 
 LISTENED_NS = 10_000_000_000
 """Recorded time: whoever beats at all has done so by then."""
-_RAW = re.compile(r"/mavlink/(\d+)_(\d+)/raw")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,17 +39,11 @@ class Senders:
         )
 
 
-def sender(topic: str) -> Name | None:
-    """Whose frames a topic holds; None of a topic without frames."""
-    match = _RAW.fullmatch(topic)
-    return None if match is None else (int(match[1]), int(match[2]))
-
-
 def senders(reader: Any, heard: Mapping[str, Times]) -> Senders:
     """From the first heartbeats of everybody; reader: of mcap;  heard: topic → times of its messages, ns."""
     vehicles, stations = set[int](), {(GROUND_SYSTEM, GROUND_COMPONENT)}
     for topic, times in heard.items():
-        if sender(topic) is None:
+        if raw_sender(topic) is None:
             continue
         for frame in _beats(reader, topic, int(times[0])):
             if of_station(frame):

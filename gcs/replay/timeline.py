@@ -16,11 +16,12 @@ from mcap.reader import SeekingReader
 
 from gcs.choices import BadUsageError
 from gcs.recording import history as flights
+from gcs.recording.channels import raw_sender
 from gcs.recording.files import SCENARIO
 from gcs.recording.history import Happening, History, Kind
 from gcs.recording.reader import RECORD_SIZE_LIMIT, UnreadableRecording, located, readable
 from gcs.replay.index import Silence, silences, times
-from gcs.replay.senders import Senders, sender, senders
+from gcs.replay.senders import Senders, senders
 from wire.ids import AUTOPILOT
 
 STEP_NS = 100_000_000
@@ -129,7 +130,7 @@ def load(path: Path) -> Timeline:
         ours = any(attachment.name == SCENARIO for attachment in summary.attachment_indexes)
         heard = times(stream, summary)
         spoke = senders(reader, heard)
-    autopilots = {name[0]: heard[topic] for topic in heard if (name := sender(topic)) and name[1] == AUTOPILOT}
+    autopilots = {name[0]: heard[topic] for topic in heard if (name := raw_sender(topic)) and name[1] == AUTOPILOT}
     return Timeline(
         path=path,
         start_ns=min(chunk.message_start_time for chunk in summary.chunk_indexes),

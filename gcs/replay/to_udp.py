@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from gcs.choices import BadUsageError
+from gcs.recording.channels import RAW
 from gcs.replay.outputs import Played
 from gcs.replay.senders import Senders
 from wire.connection import Connection, ConnectionRefused, parse
@@ -103,7 +104,7 @@ class UdpOutput:
         """Each frame of a vehicle in a datagram of its own, as it was recorded; one that nobody takes is gone."""
         self._port.receive()
         for message in messages:
-            if message.encoding == "mavlink":
+            if message.encoding == RAW:
                 for frame in self._framer.frames(message.time_ns, message.data):
                     if may_leave(frame, self._senders):
                         self.sent += self._left(frame.raw)

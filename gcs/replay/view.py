@@ -7,10 +7,10 @@ from bisect import bisect_left
 from dataclasses import dataclass
 
 from gcs.fleet_table import age_s
+from gcs.recording.channels import raw_sender
 from gcs.recording.history import History
 from gcs.replay.player import Span
 from gcs.replay.reel import Reel
-from gcs.replay.senders import sender
 from gcs.replay.timeline import Timeline
 from gcs.telemetry import Swarm, observe
 from gcs.track import Parts
@@ -107,7 +107,7 @@ class OfFrames:
         if self._at_ns is None or not 0 <= position_ns - self._at_ns <= MEMORY_NS:
             self._swarm, self._at_ns = self._nothing, position_ns - MEMORY_NS
         played = self._reel.play(Span(self._at_ns, position_ns))
-        frames = [f for m in played if sender(m.topic) for f in self._framer.frames(m.time_ns, m.data)]
+        frames = [f for m in played if raw_sender(m.topic) for f in self._framer.frames(m.time_ns, m.data)]
         self._swarm, self._at_ns = observe(self._swarm, frames), position_ns
         return View("", "", tuple(_of_swarm(self._swarm, row, position_ns) for row in range(len(self._swarm.ids))))
 

@@ -3,8 +3,8 @@
 from flights import messages, scratch
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from gcs.recording.channels import raw_sender
 from gcs.recording.mcap_file import McapFile
-from gcs.replay.senders import sender
 
 OTHER_STATION = 254, 230
 """System and component of a ground station that is not ours."""
@@ -21,7 +21,7 @@ def frames_alone(path, *, keep=lambda _sender, _seconds: True, more=()):
     frames = [
         (time_ns, topic, data)
         for topic, time_ns, data in recorded
-        if (name := sender(topic)) and keep(name, (time_ns - start_ns) / 1e9)
+        if (name := raw_sender(topic)) and keep(name, (time_ns - start_ns) / 1e9)
     ]
     frames += [(start_ns + round(at_s * 1e9), f"/mavlink/{data[5]}_{data[6]}/raw", data) for at_s, data in more]
     file, channels = McapFile(copy), {}
