@@ -6,28 +6,26 @@ import datetime as dt
 import time
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from gcs import console
 from gcs.emergency import LastResort
 from gcs.events import Rating
 from gcs.flight import Flight
-from gcs.flight_state import FlightState, left_behind
+from gcs.flight_state import FlightState
 from gcs.loop import Clock, Link, Record, Tick, fly
 from gcs.operator import Operator
-from gcs.output import PICTURE
+from gcs.outcome import failure_of, summary_of, with_problem, written
 from gcs.recording.files import FAULTS, MADE, PLANNED, SUMMARY
 from gcs.recording.journal import Journal, Journaled
 from gcs.recording.reader import RECORDING
 from gcs.recording.writer import IN_LARGE_CHUNKS_NS, Recorder, Tap
-from gcs.scoring import min_separation, score
-from gcs.shielded import Shielded, in_words
-from gcs.summary import Reception, Summary, collision, severity_of, trust_of
-from gcs.track import Track, Tracker
+from gcs.shielded import Shielded
+from gcs.summary import Reception, Summary
+from gcs.track import Tracker
 from gcs.truth import Truth
 from gcs.versions import installed
-from gcs.words import faults
 from scenarios import Scenario
 
 
@@ -98,7 +96,7 @@ def flown(
     def came_of_it(failure: str | None = None) -> Summary:
         """Without what failed beside the flight; the recording is told both."""
         took_s, path = time.perf_counter() - began, (out / RECORDING).resolve()
-        summary = _summary(
+        summary = summary_of(
             name, scenario, reached.state, failure, tracker.track, seed, took_s, path, link.rejected, reception()
         )
         recorder.add_metadata(SUMMARY, {"json": beside(summary).json().decode()})
@@ -107,7 +105,7 @@ def flown(
     def beside(summary: Summary) -> Summary:
         """With what failed beside the flight, so far."""
         journal = None if recording.journal is None else recording.journal.problem
-        return _with_problem(summary, recorder.problem, journal, *(record.problem for record in shielded))
+        return with_problem(summary, recorder.problem, journal, *(record.problem for record in shielded))
 
     with recorder:
         records: tuple[tuple[str, Record], ...] = (
@@ -124,10 +122,10 @@ def flown(
                 fly(noted, clock, flight, shielded, period_ns=scenario.time.period_ns, events=operator.events)
         except BaseException as error:
             with suppress(Exception):  # that it failed is what there is to be raised
-                beside(came_of_it(_failure(error))).save(out)
+                beside(came_of_it(failure_of(error))).save(out)
             raise
         summary = came_of_it()
-    return _written(beside(summary), tracker.track if pictured else None, scenario, out)
+    return written(beside(summary), tracker.track if pictured else None, scenario, out)
 
 
 class _Reached:
@@ -140,37 +138,6 @@ class _Reached:
         self.state = tick.state
 
 
-def _failure(error: BaseException) -> str:
-    if isinstance(error, KeyboardInterrupt):
-        return "ended at once by Ctrl-C: its vehicles were not told to land"
-    return f"the flight failed: {in_words(error)}; its vehicles were told to land"
-
-
-def _with_problem(summary: Summary, *problems: str | None) -> Summary:
-    """The first there is; the flight's own comes before all others."""
-    problem = summary.problem or next(filter(None, problems), None)
-    return summary if problem is None else replace(summary, problem=problem, passed=False)
-
-
-def _written(summary: Summary, track: Track | None, scenario: Scenario, out: Path) -> Summary:
-    """Leaves a picture of the track and summary.json; what keeps them from being written is a problem of the flight."""
-    picture = out / PICTURE
-    try:
-        if track is not None:
-            from gcs.picture import draw
-
-            draw(track, scenario, picture, problem=summary.problem)
-        summary.save(out)
-    except Exception as error:  # whatever it is, a flight that was flown is told of
-        why = (error.strerror or error) if isinstance(error, OSError) else in_words(error)
-        problem = f"{out}: the results cannot be written: {why}"
-        summary = replace(summary, problem="; ".join(filter(None, (summary.problem, problem))), passed=False)
-        with suppress(OSError):
-            picture.unlink(missing_ok=True)  # torn; and there may be room for the summary now
-            summary.save(out)
-    return summary
-
-
 def _metadata(name: str, seed: int | None, ratings: Sequence[Rating] | None, *, faults_made: bool) -> dict[str, str]:
     """Versions, seed, who rates, whose the faults are and wall time: outside the promise of same seed, same bytes."""
     return {
@@ -181,46 +148,3 @@ def _metadata(name: str, seed: int | None, ratings: Sequence[Rating] | None, *, 
         "started": dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
         **installed(),
     }
-
-
-def _summary(
-    name: str,
-    scenario: Scenario,
-    state: FlightState,
-    failure: str | None,
-    track: Track | None,
-    seed: int | None,
-    took_s: float,
-    recording: Path,
-    rejected_frames: int,
-    reception: Reception,
-) -> Summary:
-    result = None if track is None else score(track, scenario)
-    closest = None if track is None else min_separation(track.position)
-    simulated_s = state.tick * scenario.time.period_s
-    problem = "; ".join(filter(None, (state.problem or collision(closest), failure))) or None
-    return Summary(
-        scenario=name,
-        controller=scenario.control.rule,
-        trust=trust_of(scenario),
-        severity=severity_of(scenario),
-        seed=seed,
-        heading_error_deg=None if result is None else result.heading_error_deg,
-        distance_to_target_m=None if result is None else result.distance_to_target_m,
-        min_separation_m=None if result is None else result.min_separation_m,
-        passed=bool(result and result.passed and problem is None),
-        detected={} if result is None else {str(k): v for k, v in result.detected.items()},
-        false_alarms=0 if result is None else result.false_alarms,
-        left_behind=left_behind(state),
-        simulated_s=round(simulated_s, 6),
-        real_time_factor=round(simulated_s / took_s, 2),
-        recording=str(recording),
-        profile=scenario.control.profile,
-        scored_on="telemetry" if track is not None and track.measured else "truth",
-        faults=faults(scenario),
-        swarm_heading_error_deg=None if result is None else result.swarm_heading_error_deg,
-        rejected_frames=rejected_frames,
-        rejections=dict(reception.rejections),
-        loss=reception.loss,
-        problem=problem,
-    )
