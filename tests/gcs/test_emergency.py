@@ -110,7 +110,7 @@ def test_an_error_when_all_have_landed_commands_nothing(monkeypatch):
     def unsound(*_figures):
         raise defect()
 
-    monkeypatch.setattr(session, "_summary", unsound)
+    monkeypatch.setattr(session, "summary_of", unsound)
     said = []
     _, error = in_lockstep(said=said)
     assert isinstance(error, ZeroDivisionError)
