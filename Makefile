@@ -7,7 +7,7 @@ VENV   ?= .venv
 BIN    := $(VENV)/bin
 RUNS   := runs/$(shell date +%Y%m%dT%H%M%S)-side-by-side
 JOBS   ?= 2
-WAITERS ?= 4
+WAITERS ?= 3
 
 .PHONY: setup fly test check soak bench clean
 
