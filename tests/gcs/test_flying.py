@@ -45,9 +45,9 @@ def degraded(tmp_path_factory):
     keys = [folder / name for name in ("vehicles-key", "ground-key")]
     for key in keys:
         key.write_text("correct horse battery staple\n")
-    to = ("--to", f"udpout:{HOST}:{port}", "--speed", "4", "--no-fault", "--signing-key", keys[0])
+    to = ("--to", f"udpout:{HOST}:{port}", "--speed", "2", "--no-fault", "--signing-key", keys[0])
     server = start(FDM, "serve", "emergency", *to)
-    words = ("--link", f"udpin:{HOST}:{port}", "--speed", "4", "--arm", "--yes", "--json", "--out", folder / "run")
+    words = ("--link", f"udpin:{HOST}:{port}", "--speed", "2", "--arm", "--yes", "--json", "--out", folder / "run")
     process = start(
         GCS, "fly", "emergency", *words, "--degrade", "5", "--signing-key", keys[1], stdin=subprocess.DEVNULL
     )
