@@ -26,7 +26,7 @@ from gcs.recording.topics import SCHEMA
 from scenarios import Scenario
 from wire.frames import sender_of
 
-SOFTWARE = ("trustr", "python", "jsbsim", "pymavlink", "numpy", "mcap")
+SOFTWARE = ("trustr", "sources", "python", "jsbsim", "pymavlink", "numpy", "mcap", "machine")
 """Whose versions a recording tells."""
 
 

@@ -109,7 +109,7 @@ def _ticks(turn: Turn) -> Iterator[Written]:
 
 @cache
 def _json(topic: str, kind: Any) -> Channel:
-    name = f"trustr.{kind.__name__.removesuffix('Topic')}"
+    name = f"{topics.SCHEMA}{kind.__name__.removesuffix('Topic')}"
     return Channel(topic, "json", name, "jsonschema", orjson.dumps(topics.schema(kind)))
 
 

@@ -10,6 +10,7 @@ from itertools import count
 
 from gcs.choices import BadUsageError
 from gcs.console import say
+from gcs.recording.channels import RAW
 from gcs.replay.outputs import Played
 
 try:
@@ -19,8 +20,6 @@ except ImportError:
     raise BadUsageError("--foxglove needs foxglove-sdk: pip install 'trustr[foxglove]'") from None
 
 HOST = "127.0.0.1"
-UNREADABLE = "mavlink"
-"""Raw frames: Foxglove has no decoder for them. What `gcs log export --to mcap` decodes, it reads."""
 
 
 class FoxgloveOutput:
@@ -51,7 +50,7 @@ class FoxgloveOutput:
     def put(self, messages: Sequence[Played]) -> None:
         """To whoever has subscribed to their topics; and what time it is."""
         for message in messages:
-            if message.encoding != UNREADABLE:
+            if message.encoding != RAW:  # Foxglove has no decoder for them; what an export decodes, it reads
                 self._channel(message).log(message.data, log_time=message.time_ns)
         if messages:
             self._server.broadcast_time(messages[-1].time_ns)
